@@ -1,0 +1,1 @@
+"""Angles, planar poses, segments: geometry without any notion of robots."""
