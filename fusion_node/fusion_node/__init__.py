@@ -1,0 +1,1 @@
+"""Node: all measurements to the pose in the map and the transform map to odom."""

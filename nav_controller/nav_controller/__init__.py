@@ -1,0 +1,1 @@
+"""Nodes: drive to waypoints and tables, and the safety stop before the wheels."""

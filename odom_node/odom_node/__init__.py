@@ -1,0 +1,1 @@
+"""Node: wheel encoders and IMU to odom and the transform odom to base_link."""

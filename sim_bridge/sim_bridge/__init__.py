@@ -1,0 +1,1 @@
+"""Node: the simulated robot and room on the ROS side."""

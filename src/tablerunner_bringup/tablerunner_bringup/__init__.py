@@ -1,0 +1,1 @@
+"""Launcher, launch files, parameters, scenarios, bag recorder and player of Tablerunner."""
