@@ -1,0 +1,44 @@
+"""The room as people describe it: walls, tables, anchors, people, the robot and its sensors.
+
+`load_scenario` reads a YAML file into a `Scenario` and refuses, with file, line, field and value,
+what cannot be.
+"""
+
+from tablerunner.scenario.anchor import AnchorPlace
+from tablerunner.scenario.box import Box
+from tablerunner.scenario.kitchen import Kitchen
+from tablerunner.scenario.outline import Outline
+from tablerunner.scenario.person import Person
+from tablerunner.scenario.robot import DriveLimits, RobotGeometry, UltrasonicMount
+from tablerunner.scenario.scenario import Scenario, load_scenario
+from tablerunner.scenario.sensors import (
+    ImuErrors,
+    MagneticErrors,
+    SensorErrors,
+    UltrasonicErrors,
+    UwbErrors,
+    WheelErrors,
+)
+from tablerunner.scenario.table import Table
+from tablerunner.scenario.wall import Wall
+
+__all__ = [
+    'AnchorPlace',
+    'Box',
+    'DriveLimits',
+    'ImuErrors',
+    'Kitchen',
+    'MagneticErrors',
+    'Outline',
+    'Person',
+    'RobotGeometry',
+    'Scenario',
+    'SensorErrors',
+    'Table',
+    'UltrasonicErrors',
+    'UltrasonicMount',
+    'UwbErrors',
+    'Wall',
+    'WheelErrors',
+    'load_scenario',
+]
