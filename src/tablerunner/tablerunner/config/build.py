@@ -44,9 +44,7 @@ def build(cls: type[C], document: Document, path: str = '') -> C:
 
 def to_mapping(config: Config) -> dict[str, Any]:
     """Return plain nested dicts and lists (for YAML or JSON) of a Config."""
-    return {
-        name: _plain(getattr(config, name)) for name in parameters_of(type(config))
-    }
+    return {name: _plain(getattr(config, name)) for name in parameters_of(type(config))}
 
 
 def _plain(value: Any) -> Any:
@@ -75,9 +73,7 @@ def _record(cls: type[Config], data: Any, path: str, document: Document) -> Conf
         kind, info = known[item.name]
         if item.name in data:
             values[item.name] = _value(kind, data[item.name], _join(path, item.name), document)
-        elif (
-            item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING
-        ):
+        elif item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING:
             words = f'{info.expected("a value")}: {info.description}'
             raise _error(document, _join(path, item.name), 'nothing', words)
     try:

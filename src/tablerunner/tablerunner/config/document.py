@@ -85,4 +85,4 @@ def _read(node: yaml.Node, path: str, lines: dict[str, int], source: str) -> Any
         return [
             _read(item, f'{path}[{index}]', lines, source) for index, item in enumerate(node.value)
         ]
-    return yaml.SafeLoader('').construct_object(node, deep=True)  # type: ignore[no-untyped-call]
+    return yaml.SafeLoader('').construct_object(node, deep=True)

@@ -9,13 +9,14 @@ import typing
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
-from functools import lru_cache
 from typing import Any, TypeVar
 
 from tablerunner.errors import ConfigError
 
 _KEY = 'tablerunner'
 C = TypeVar('C', bound='Config')
+
+_PARAMETERS: dict[type, dict[str, tuple[Any, Parameter]]] = {}  # resolving hints is slow
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +85,17 @@ def parameter(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-@lru_cache(maxsize=None)
-def parameters_of(cls: type) -> dict[str, tuple[Any, Parameter]]:
+def parameters_of(cls: type[Config]) -> dict[str, tuple[Any, Parameter]]:
     """Return name -> (type, Parameter) of a Config class, in order of declaration."""
-    hints = typing.get_type_hints(cls)
-    return {
-        item.name: (hints[item.name], item.metadata.get(_KEY, Parameter('')))
-        for item in dataclasses.fields(cls)
-    }
+    known = _PARAMETERS.get(cls)
+    if known is None:
+        hints = typing.get_type_hints(cls)
+        known = {
+            item.name: (hints[item.name], item.metadata.get(_KEY, Parameter('')))
+            for item in dataclasses.fields(cls)
+        }
+        _PARAMETERS[cls] = known
+    return known
 
 
 @dataclass(frozen=True)
@@ -148,9 +152,7 @@ def _check(name: str, value: Any, kind: Any, info: Parameter) -> None:
         raise ConfigError(name, value, info.expected('a word'))
 
 
-def _items(
-    name: str, value: Any, kind: Any, info: Parameter
-) -> Iterator[tuple[Any, Any]]:
+def _items(name: str, value: Any, kind: Any, info: Parameter) -> Iterator[tuple[Any, Any]]:
     arguments = typing.get_args(kind)
     if not isinstance(value, tuple):
         raise ConfigError(name, value, 'a list')

@@ -29,7 +29,9 @@ def difference(to: float, start: float) -> float:
     return wrap(to - start)
 
 
-def circular_mean(angles: NDArray[np.float64], weights: NDArray[np.float64] | None = None) -> float:
+def circular_mean(
+    angles: NDArray[np.float64], weights: NDArray[np.float64] | None = None
+) -> float:
     """Return the direction of the (weighted) mean unit vector of `angles`, shape (n,)."""
     weighting = np.ones_like(angles) if weights is None else weights
     return math.atan2(

@@ -34,7 +34,9 @@ def cast_rays_at_circles(origins: Array, directions: Array, centres: Array, radi
     return np.asarray(np.min(np.where(hit, np.maximum(near, 0.0), np.inf), axis=1))
 
 
-def sight_crosses_circles(starts: Array, ends: Array, centres: Array, radii: Array) -> NDArray[np.bool_]:
+def sight_crosses_circles(
+    starts: Array, ends: Array, centres: Array, radii: Array
+) -> NDArray[np.bool_]:
     """Return which lines of sight, (p, 2) to (p, 2), pass through which circles, shape (p, n)."""
     sight = ends - starts
     length2 = np.maximum(np.sum(sight**2, axis=-1), 1e-18)[:, None]

@@ -47,7 +47,7 @@ class Pose2:
         """Return points of this frame, shape (..., 2), in the parent frame."""
         cos, sin = math.cos(self.heading), math.sin(self.heading)
         rotation = np.array([[cos, -sin], [sin, cos]])
-        return points @ rotation.T + np.array([self.x, self.y])
+        return np.asarray(points @ rotation.T + np.array([self.x, self.y]))
 
     def distance_to(self, other: Pose2) -> float:
         """Return the distance between the two origins [m]."""

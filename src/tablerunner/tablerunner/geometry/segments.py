@@ -23,7 +23,7 @@ def rectangle_corners(x: float, y: float, heading: float, length: float, width: 
     """
     cos, sin = np.cos(heading), np.sin(heading)
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [length / 2, width / 2]
-    return half @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
+    return np.asarray(half @ np.array([[cos, sin], [-sin, cos]]) + [x, y])
 
 
 def distance_to_segments(points: Array, segments: Array) -> Array:

@@ -1,0 +1,185 @@
+"""From exchanges to calibrated ranges, one at a time, refusing what cannot be right."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tablerunner.config import Config, parameter
+from tablerunner.errors import ConfigError
+from tablerunner.types import Anchor, ExchangeSample, LosState, RangeSample, Refusal
+from tablerunner.uwb import ranging
+
+SOURCE = 'uwb/exchanges'
+
+_LONGEST_EXCHANGE_TICKS = 0.1 / ranging.TICK_S
+
+
+@dataclass(frozen=True)
+class RangerConfig(Config):
+    """What the ranging needs to know of the anchors and of the radio."""
+
+    anchor_ids: tuple[str, ...] = parameter((), description='Names of the anchors')
+    anchor_positions: tuple[float, ...] = parameter(
+        (), unit='m', description='x, y, z of each anchor in map, one after the other'
+    )
+    anchor_biases: tuple[float, ...] = parameter(
+        (),
+        unit='m',
+        description='How much too long each anchor reads; empty: 0 for all (Sun 35)',
+        low=-5.0,
+        high=5.0,
+    )
+    anchor_scales: tuple[float, ...] = parameter(
+        (),
+        description='Share by which each anchor reads too long; empty: 0 for all (Sun 35)',
+        low=-0.2,
+        high=0.2,
+    )
+    range_std: float = parameter(
+        0.1,
+        unit='m',
+        description='Standard deviation of a line-of-sight range',
+        above=0.0,
+        high=5.0,
+        dynamic=True,
+    )
+    max_range: float = parameter(
+        60.0,
+        unit='m',
+        description='Ranges beyond this are refused',
+        above=0.0,
+        high=1000.0,
+        dynamic=True,
+    )
+    nlos_gap_centre: float = parameter(
+        8.0,
+        unit='dB',
+        description='Receive minus first-path power at which NLOS is as likely as not',
+        low=0.0,
+        high=40.0,
+        dynamic=True,
+    )
+    nlos_gap_width: float = parameter(
+        1.0,
+        unit='dB',
+        description='Width of the change from likely LOS to likely NLOS',
+        above=0.0,
+        high=20.0,
+        dynamic=True,
+    )
+
+    def check(self) -> None:
+        """Check that the lists belong together and no anchor stands twice."""
+        count = len(self.anchor_ids)
+        if len(self.anchor_positions) != 3 * count:
+            raise ConfigError(
+                'anchor_positions',
+                self.anchor_positions,
+                f'{3 * count} numbers, x, y, z for each of {count} anchor_ids',
+            )
+        for name in ('anchor_biases', 'anchor_scales'):
+            values = getattr(self, name)
+            if values and len(values) != count:
+                raise ConfigError(name, values, f'{count} numbers, one for each of anchor_ids')
+        for index, anchor_id in enumerate(self.anchor_ids):
+            if not anchor_id:
+                raise ConfigError(f'anchor_ids[{index}]', anchor_id, 'a name')
+            if anchor_id in self.anchor_ids[:index]:
+                raise ConfigError(f'anchor_ids[{index}]', anchor_id, 'each anchor once')
+
+    @property
+    def anchors(self) -> tuple[Anchor, ...]:
+        """The anchors as records; their bias is zero, since ranges leave here calibrated."""
+        return tuple(
+            Anchor(anchor_id, self.anchor_positions[3 * i : 3 * i + 3])  # type: ignore[arg-type]
+            for i, anchor_id in enumerate(self.anchor_ids)
+        )
+
+
+class Ranger:
+    """Turns exchanges into ranges; remembers only the last sequence number of each anchor."""
+
+    def __init__(self, config: RangerConfig) -> None:
+        self._last: dict[tuple[str, str], tuple[int, int]] = {}  # (stamp, sequence)
+        self.configure(config)
+
+    def configure(self, config: RangerConfig) -> None:
+        """Use other settings from now on."""
+        self.config = config
+        count = len(config.anchor_ids)
+        biases = config.anchor_biases or (0.0,) * count
+        scales = config.anchor_scales or (0.0,) * count
+        self._calibration = dict(
+            zip(config.anchor_ids, zip(biases, scales, strict=True), strict=True)
+        )
+
+    def reset(self) -> None:
+        """Forget the sequence numbers, as after a jump back in time."""
+        self._last.clear()
+
+    def add(self, sample: ExchangeSample) -> RangeSample | Refusal:
+        """Return the range of one exchange, or why there is none.
+
+        Refused are a zero stamp, an unknown anchor, a repeated sequence number, a stamp that does
+        not advance, times that no exchange can have, and a range that is negative or too long.
+        """
+        calibration = self._calibration.get(sample.anchor_id)
+        if sample.stamp <= 0:
+            return self._refuse(sample, 'zero stamp')
+        if calibration is None:
+            return self._refuse(sample, 'unknown anchor')
+        link = (sample.anchor_id, sample.tag_id)
+        last = self._last.get(link)
+        if last is not None:
+            if sample.sequence == last[1]:
+                return self._refuse(sample, 'repeated sequence number')
+            if sample.stamp <= last[0]:
+                return self._refuse(sample, 'stamp does not advance')
+        times = ranging.intervals(
+            sample.poll_tx,
+            sample.poll_rx,
+            sample.response_tx,
+            sample.response_rx,
+            sample.final_tx,
+            sample.final_rx,
+        )
+        if min(times) <= 0 or sum(times) > _LONGEST_EXCHANGE_TICKS:
+            return self._refuse(sample, 'impossible exchange times')
+        raw = ranging.distance(ranging.double_sided(*times))
+        bias, scale = calibration
+        range_m = ranging.calibrated(raw, bias, scale)
+        if not range_m > 0.0:
+            return self._refuse(sample, 'negative range')
+        if range_m > self.config.max_range:
+            return self._refuse(sample, 'range beyond max_range')
+        self._last[link] = (sample.stamp, sample.sequence)
+        probability = ranging.nlos_probability(
+            sample.rx_power_dbm,
+            sample.first_path_power_dbm,
+            self.config.nlos_gap_centre,
+            self.config.nlos_gap_width,
+        )
+        return RangeSample(
+            sample.stamp,
+            sample.anchor_id,
+            sample.tag_id,
+            sample.sequence,
+            range_m,
+            self.config.range_std**2,
+            raw,
+            sample.rx_power_dbm,
+            sample.first_path_power_dbm,
+            _los_state(probability),
+            probability,
+        )
+
+    @staticmethod
+    def _refuse(sample: ExchangeSample, reason: str) -> Refusal:
+        return Refusal(sample.stamp, SOURCE, sample.anchor_id, reason)
+
+
+def _los_state(probability: float) -> LosState:
+    if math.isnan(probability):
+        return LosState.UNKNOWN
+    return LosState.NLOS if probability > 0.5 else LosState.LOS
