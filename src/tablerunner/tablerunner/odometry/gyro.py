@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tablerunner.config import Config, parameter
+from tablerunner.stream import Order, StampOrder
 from tablerunner.types import ImuSample, Refusal, seconds
 
 SOURCE = 'imu/data'
@@ -66,6 +67,7 @@ class Gyro:
 
     def reset(self) -> None:
         """Forget everything, as after a jump back in time."""
+        self._order = StampOrder()
         self.bias = 0.0
         self._stamp = 0
         self._rate = 0.0
@@ -74,16 +76,17 @@ class Gyro:
 
     def add(self, sample: ImuSample) -> Refusal | None:
         """Take one sample; return why it is refused, if it is."""
-        if sample.stamp <= 0:
-            return Refusal(sample.stamp, SOURCE, '', 'zero stamp')
+        order = self._order.judge(sample.stamp)
+        if order is Order.RESTARTED:
+            self._stamp = 0
+        elif order is not Order.NEWEST:
+            return Refusal(sample.stamp, SOURCE, '', order.value)
         rate = sample.yaw_rate_rad_s
         if not math.isfinite(rate):
             return Refusal(sample.stamp, SOURCE, '', 'yaw rate not finite')
         if abs(rate) > self.config.max_rate:
             return Refusal(sample.stamp, SOURCE, '', 'yaw rate beyond max_rate')
         if self._stamp:
-            if sample.stamp <= self._stamp:
-                return Refusal(sample.stamp, SOURCE, '', 'stamp does not advance')
             dt = seconds(sample.stamp - self._stamp)
             if dt <= self.config.timeout:
                 self._angle += 0.5 * (rate + self._rate) * dt

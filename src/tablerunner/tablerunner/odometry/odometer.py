@@ -1,4 +1,4 @@
-"""Dead reckoning: wheels for the distance, wheels or gyroscope for the heading, with covariance."""
+"""Dead reckoning: distance from the wheels, heading from wheels or gyroscope, and covariance."""
 
 from __future__ import annotations
 

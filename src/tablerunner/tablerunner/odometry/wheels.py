@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tablerunner.config import Config, parameter
 from tablerunner.odometry.motion import Motion
+from tablerunner.stream import Order, StampOrder
 from tablerunner.types import Refusal, WheelSample, seconds
 
 SOURCE = 'joint_states'
@@ -52,38 +53,39 @@ class Wheels:
 
     def __init__(self, config: WheelsConfig) -> None:
         self.config = config
-        self._base: WheelSample | None = None
-        self._suspect: WheelSample | None = None
+        self.reset()
 
     def reset(self) -> None:
         """Forget the last angles, as after a jump back in time."""
-        self._base = None
-        self._suspect = None
+        self._order = StampOrder()
+        self._base: WheelSample | None = None
+        self._suspect: WheelSample | None = None
 
     def add(self, sample: WheelSample) -> Motion | Refusal | None:
         """Return the motion since the last good sample; None for the first one.
 
         Refused are a zero stamp, angles that are not finite, a stamp that does not advance, a
-        silence longer than `max_gap` (counting starts again) and a jump.
+        silence longer than `max_gap` (counting starts again) and a jump. A stream that began again
+        from an earlier time starts from its own first sample.
         """
-        if sample.stamp <= 0:
-            return self._refuse(sample, 'zero stamp')
+        order = self._order.judge(sample.stamp)
+        if order is Order.RESTARTED:
+            self._base = self._suspect = None
+        elif order is not Order.NEWEST:
+            return self._refuse(sample, order.value)
         if not (math.isfinite(sample.left_angle_rad) and math.isfinite(sample.right_angle_rad)):
             return self._refuse(sample, 'wheel angle not finite')
         base = self._base
         if base is None:
             self._base = sample
             return None
-        if sample.stamp <= base.stamp:
-            return self._refuse(sample, 'stamp does not advance')
         if seconds(sample.stamp - base.stamp) > self.config.max_gap:
             self._base, self._suspect = sample, None
             return self._refuse(sample, 'encoders were silent')
         motion = self._motion(base, sample)
         if motion is None and self._suspect is not None:
             base = self._suspect
-            if sample.stamp > base.stamp:
-                motion = self._motion(base, sample)
+            motion = self._motion(base, sample)
         if motion is None:
             self._suspect = sample
             return self._refuse(sample, 'encoder jump')

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tablerunner.config import Config, parameter
 from tablerunner.errors import ConfigError
+from tablerunner.stream import Order, StampOrder
 from tablerunner.types import Anchor, ExchangeSample, LosState, RangeSample, Refusal
 from tablerunner.uwb import ranging
 
@@ -98,10 +99,11 @@ class RangerConfig(Config):
 
 
 class Ranger:
-    """Turns exchanges into ranges; remembers only the last sequence number of each anchor."""
+    """Turns exchanges into ranges; remembers only what came last of each anchor."""
 
     def __init__(self, config: RangerConfig) -> None:
-        self._last: dict[tuple[str, str], tuple[int, int]] = {}  # (stamp, sequence)
+        self._sequence: dict[tuple[str, str], int] = {}
+        self._order: dict[tuple[str, str], StampOrder] = {}
         self.configure(config)
 
     def configure(self, config: RangerConfig) -> None:
@@ -116,7 +118,8 @@ class Ranger:
 
     def reset(self) -> None:
         """Forget the sequence numbers, as after a jump back in time."""
-        self._last.clear()
+        self._sequence.clear()
+        self._order.clear()
 
     def add(self, sample: ExchangeSample) -> RangeSample | Refusal:
         """Return the range of one exchange, or why there is none.
@@ -125,17 +128,15 @@ class Ranger:
         not advance, times that no exchange can have, and a range that is negative or too long.
         """
         calibration = self._calibration.get(sample.anchor_id)
-        if sample.stamp <= 0:
-            return self._refuse(sample, 'zero stamp')
         if calibration is None:
             return self._refuse(sample, 'unknown anchor')
         link = (sample.anchor_id, sample.tag_id)
-        last = self._last.get(link)
-        if last is not None:
-            if sample.sequence == last[1]:
-                return self._refuse(sample, 'repeated sequence number')
-            if sample.stamp <= last[0]:
-                return self._refuse(sample, 'stamp does not advance')
+        if sample.stamp > 0 and self._sequence.get(link) == sample.sequence:
+            return self._refuse(sample, 'repeated sequence number')
+        order = self._order.setdefault(link, StampOrder()).judge(sample.stamp)
+        if order in (Order.ZERO, Order.LATE):
+            return self._refuse(sample, order.value)
+        self._sequence[link] = sample.sequence
         times = ranging.intervals(
             sample.poll_tx,
             sample.poll_rx,
@@ -153,7 +154,6 @@ class Ranger:
             return self._refuse(sample, 'negative range')
         if range_m > self.config.max_range:
             return self._refuse(sample, 'range beyond max_range')
-        self._last[link] = (sample.stamp, sample.sequence)
         probability = ranging.nlos_probability(
             sample.rx_power_dbm,
             sample.first_path_power_dbm,
