@@ -1,0 +1,24 @@
+"""Stamps: builtin_interfaces/Time and integer nanoseconds."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+
+from tablerunner.types import NANOSECONDS
+
+
+def stamp_from_message(message: Time) -> int:
+    """Return a message's time as nanoseconds."""
+    return message.sec * NANOSECONDS + message.nanosec
+
+
+def stamp_to_message(stamp: int) -> Time:
+    """Return nanoseconds as a message."""
+    message = Time()
+    fill_stamp(message, stamp)
+    return message
+
+
+def fill_stamp(message: Time, stamp: int) -> None:
+    """Write nanoseconds into a time message."""
+    message.sec, message.nanosec = divmod(stamp, NANOSECONDS)
