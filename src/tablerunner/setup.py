@@ -12,7 +12,7 @@ setup(
     maintainer_email='maintainers@tablerunner.example',
     license='Apache-2.0',
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
-    package_data={PACKAGE: ['py.typed', '**/*.yaml', '**/*.json', '**/*.csv']},
+    package_data={PACKAGE: ['py.typed', '**/*.yaml', '**/*.json', '**/*.csv', '**/*.msg']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
