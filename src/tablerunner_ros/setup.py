@@ -7,7 +7,7 @@ PACKAGE = 'tablerunner_ros'
 setup(
     name=PACKAGE,
     version='0.1.0',
-    description='What every Tablerunner node shares: parameters from dataclasses, messages to records, QoS, diagnostics',
+    description='What every Tablerunner node shares',
     maintainer='Tablerunner maintainers',
     maintainer_email='maintainers@tablerunner.example',
     license='Apache-2.0',

@@ -1,0 +1,172 @@
+"""What a node takes, what it refuses and why, once a second on /diagnostics.
+
+One status per stream (``NODE: uwb/ranges``) and one for the node itself (``NODE``):
+
+- OK: nothing was refused since the last report, and what should arrive arrives;
+- WARN: something was refused since the last report, or the stream has not begun;
+- ERROR: everything since the last report was refused, or the stream has fallen silent.
+
+Counters go on from the start of the node, so that a reader may come late and still see all.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from tablerunner.types import NANOSECONDS, Refusal
+from tablerunner_ros.clocks import steady_ns, steady_timer
+from tablerunner_ros.qos import qos_for
+
+OK = DiagnosticStatus.OK
+WARN = DiagnosticStatus.WARN
+ERROR = DiagnosticStatus.ERROR
+
+PERIOD_S = 1.0
+"""Time between reports, of the steady clock: also while simulated time stands."""
+
+LOG_EVERY_NS = 30 * NANOSECONDS
+"""A refusal for the same reason is logged again after this long at the soonest."""
+
+
+@dataclass
+class Report:
+    """One status in the making: the worst level wins, words and values add up."""
+
+    name: str
+    level: bytes = OK
+    message: str = ''
+    values: dict[str, str] = field(default_factory=dict)
+
+    def add(self, level: bytes, message: str) -> None:
+        """Raise the level if this one is worse; words of the worst level are kept."""
+        if level > self.level or not self.message:
+            self.level, self.message = max(level, self.level), message
+        elif level == self.level:
+            self.message = f'{self.message}; {message}'
+
+    def to_message(self, hardware_id: str) -> DiagnosticStatus:
+        """Return it as a message."""
+        return DiagnosticStatus(
+            level=self.level,
+            name=self.name,
+            message=self.message or 'ok',
+            hardware_id=hardware_id,
+            values=[KeyValue(key=key, value=value) for key, value in self.values.items()],
+        )
+
+
+class _Stream:
+    """Counters of one stream."""
+
+    def __init__(self, silence_s: float) -> None:
+        self.silence_ns = round(silence_s * NANOSECONDS)
+        self.taken = 0
+        self.refused = 0
+        self.reasons: Counter[str] = Counter()
+        self.last_ns = 0  # steady time of the newest message that was taken
+        self.stamp = 0
+        self.reported_taken = 0
+        self.reported_refused = 0
+
+
+class Diagnostics:
+    """Counts for one node and reports every second.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Its name stands before each status.
+    hardware_id : str
+        What the values are about, e.g. the tag's name; may be empty.
+    """
+
+    def __init__(self, node: Node, hardware_id: str = '') -> None:
+        self._node = node
+        self._hardware_id = hardware_id
+        self._streams: dict[str, _Stream] = {}
+        self._extras: list[Callable[[Report], None]] = []
+        self._logged: dict[tuple[str, str], int] = {}
+        self._started_ns = self._reported_ns = steady_ns()
+        self._name = node.get_name()
+        self._publisher = node.create_publisher(
+            DiagnosticArray, 'diagnostics', qos_for('diagnostics')
+        )
+        steady_timer(node, PERIOD_S, self.publish)
+
+    def watch(self, source: str, silence_s: float = 0.0) -> None:
+        """Report a stream from now on; silent for longer than `silence_s` is an error (0: never)."""
+        self._streams[source] = _Stream(silence_s)
+
+    def describe(self, extra: Callable[[Report], None]) -> None:
+        """Call back before each report to raise the level or add values of the node's status."""
+        self._extras.append(extra)
+
+    def take(self, source: str, stamp: int = 0) -> None:
+        """Count a message that was used; `stamp` [ns] is that of the measurement."""
+        stream = self._stream(source)
+        stream.taken += 1
+        stream.last_ns = steady_ns()
+        stream.stamp = stamp
+
+    def refuse(self, refusal: Refusal) -> None:
+        """Count a refusal by source, reason and key; log it now and then."""
+        stream = self._stream(refusal.source)
+        stream.refused += 1
+        reason = f'{refusal.reason} ({refusal.key})' if refusal.key else refusal.reason
+        stream.reasons[reason] += 1
+        now = steady_ns()
+        mark = (refusal.source, reason)
+        if now - self._logged.get(mark, -LOG_EVERY_NS) >= LOG_EVERY_NS:
+            self._logged[mark] = now
+            self._node.get_logger().warning(f'{refusal.source} refused: {reason}')
+
+    def publish(self) -> None:
+        """Publish the report of the time since the last one."""
+        now = steady_ns()
+        message = DiagnosticArray()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        own = Report(self._name)
+        for extra in self._extras:
+            extra(own)
+        reports = [own]
+        reports += [self._report(source, stream, now) for source, stream in self._streams.items()]
+        message.status = [report.to_message(self._hardware_id) for report in reports]
+        self._publisher.publish(message)
+        self._reported_ns = now
+
+    def _stream(self, source: str) -> _Stream:
+        stream = self._streams.get(source)
+        if stream is None:
+            stream = self._streams[source] = _Stream(0.0)
+        return stream
+
+    def _report(self, source: str, stream: _Stream, now: int) -> Report:
+        report = Report(f'{self._name}: {source}')
+        taken = stream.taken - stream.reported_taken
+        refused = stream.refused - stream.reported_refused
+        stream.reported_taken, stream.reported_refused = stream.taken, stream.refused
+        elapsed_s = max((now - self._reported_ns) / NANOSECONDS, 1e-3)
+        if refused:
+            worst = stream.reasons.most_common(1)[0][0]
+            level = WARN if taken else ERROR
+            report.add(level, f'{refused} of {taken + refused} refused, mostly: {worst}')
+        if stream.silence_ns:
+            quiet_ns = now - (stream.last_ns or self._started_ns)
+            if quiet_ns > stream.silence_ns:
+                level = ERROR if stream.last_ns else WARN
+                words = 'silent' if stream.last_ns else 'nothing received yet'
+                report.add(level, f'{words} for {quiet_ns / NANOSECONDS:.1f} s')
+        report.values = {
+            'taken': str(stream.taken),
+            'refused': str(stream.refused),
+            'rate [Hz]': f'{taken / elapsed_s:.1f}',
+            'last stamp [ns]': str(stream.stamp),
+        }
+        for reason, count in stream.reasons.items():
+            report.values[f'refused: {reason}'] = str(count)
+        return report
