@@ -21,7 +21,9 @@ class Person(Config):
         False, description='true: from the last point to the first; false: there and back'
     )
     speed: float = parameter(0.8, description='walking speed', unit='m/s', low=0.0, high=3.0)
-    radius: float = parameter(0.25, description='radius of the body seen from above', unit='m', above=0.0)
+    radius: float = parameter(
+        0.25, description='radius of the body seen from above', unit='m', above=0.0
+    )
     height: float = parameter(1.7, description='height', unit='m', above=0.0)
     start_share: float = parameter(
         0.0, description='where on the route the walk begins, as a share of it', low=0.0, high=1.0
@@ -40,6 +42,10 @@ class Person(Config):
     )
     yield_distance: float = parameter(
         0.6, description='free space that is kept to a robot in the way', unit='m', low=0.0
+    )
+
+    patience: float = parameter(
+        3.0, description='wait for a robot in the way before turning back', unit='s', low=0.0
     )
 
     def check(self) -> None:

@@ -46,7 +46,11 @@ class UwbErrors(Config):
         0.10, description='chance to lose an exchange out of sight', low=0.0, high=1.0
     )
     clock_error_ppm: float = parameter(
-        5.0, description='spread of the rate error of each device clock', unit='ppm', low=0.0, high=100.0
+        5.0,
+        description='spread of the rate error of each device clock',
+        unit='ppm',
+        low=0.0,
+        high=100.0,
     )
     clock_walk_ppm: float = parameter(
         0.02, description='random walk of the rate error, per root second', unit='ppm', low=0.0

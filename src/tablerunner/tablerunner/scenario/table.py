@@ -32,7 +32,9 @@ class Table(Config):
     length: float = parameter(
         1.2, description='extent along its heading; the diameter when round', unit='m', above=0.0
     )
-    width: float = parameter(0.8, description='extent across; unused when round', unit='m', above=0.0)
+    width: float = parameter(
+        0.8, description='extent across; unused when round', unit='m', above=0.0
+    )
     height: float = parameter(0.75, description='height of the top', unit='m', above=0.0)
 
     @property
