@@ -1,0 +1,71 @@
+"""What the readers of both storages have in common: topics, entries, and records of damage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Something that a bag should hold and that cannot be read.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file inside the bag.
+    place : str
+        Where in it: ``byte 4711``, ``messages 120 to 133``, a topic; empty for the whole file.
+    reason : str
+        What is wrong.
+    lost : str
+        What is missing because of it, as far as it is known; empty when nothing is.
+    """
+
+    file: str
+    place: str
+    reason: str
+    lost: str = ''
+
+    def __str__(self) -> str:
+        """Return it as one line for people."""
+        where = f'{self.file}, {self.place}' if self.place else self.file
+        return f'{where}: {self.reason}' + (f'; {self.lost}' if self.lost else '')
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic as one storage file knows it."""
+
+    topic: str
+    msgtype: str
+    encoding: str = ''  # of the definition: ros2msg or ros2idl; empty when there is none
+    definition: str = ''
+    serialization: str = 'cdr'
+    qos: str = ''  # offered QoS profiles, YAML as in the bag
+
+
+class Entry(NamedTuple):
+    """Where one message is; entries sort by time, then by their order in the bag."""
+
+    stamp: int  # [ns] time of reception
+    order: int  # counts the messages of one file in the order they were written
+    channel: int
+    place: tuple[int, int, int]  # the storage's own
+
+
+class Storage(Protocol):
+    """One storage file of a bag, read as far as it can be read."""
+
+    path: Path
+    channels: dict[int, Channel]
+    entries: list[Entry]
+    damage: list[Damage]
+    metadata: str  # text of the metadata.yaml that the file carries inside; may be empty
+
+    def load(self, place: tuple[int, int, int]) -> bytes:
+        """Return the serialised message at a place that an entry names."""
+
+    def close(self) -> None:
+        """Let go of the file."""
