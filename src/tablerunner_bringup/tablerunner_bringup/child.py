@@ -93,7 +93,7 @@ class Child:
                 stderr=subprocess.STDOUT,
                 env=environment,
                 start_new_session=True,  # a Ctrl-C in the terminal reaches only the launcher
-                preexec_fn=_preparation(command.orphan_signal),  # noqa: PLW1509 - calls libc only
+                preexec_fn=_preparation(command.orphan_signal),
             )
         self._ending: Ending | None = None
 

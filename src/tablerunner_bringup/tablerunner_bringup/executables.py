@@ -19,9 +19,7 @@ def prefixes() -> tuple[Path, ...]:
     return tuple(Path(entry) for entry in listed.split(os.pathsep) if entry)
 
 
-def find_executable(
-    package: str, executable: str, among: Sequence[Path] | None = None
-) -> Path:
+def find_executable(package: str, executable: str, among: Sequence[Path] | None = None) -> Path:
     """Return the path of ``lib/<package>/<executable>`` under the first prefix that has it.
 
     Raises

@@ -32,7 +32,7 @@ class Interrupts:
             # None: installed by something that is not Python; it cannot be given back.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
-    def _receive(self, number: int, frame: FrameType | None) -> None:
+    def _receive(self, number: int, _frame: FrameType | None) -> None:
         self._count += 1
         if self._first is None:
             self._first = number

@@ -30,7 +30,8 @@ def test_acquire_holder_killed_frees_domain(tmp_path):
     """A run that was killed does not keep its domain."""
     code = (
         'import sys, time; from pathlib import Path; from tablerunner_bringup.domains import '
-        'acquire; d = acquire([61], Path(sys.argv[1])); print(d.number, flush=True); time.sleep(60)'
+        'acquire; d = acquire([61], Path(sys.argv[1])); print(d.number, flush=True); '
+        'time.sleep(60)'
     )
     holder = subprocess.Popen(
         [sys.executable, '-c', code, str(tmp_path)], stdout=subprocess.PIPE, text=True

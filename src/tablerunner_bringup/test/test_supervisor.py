@@ -195,7 +195,8 @@ LAUNCHER = """
     code = ('import signal, time\\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\\n'
             'signal.signal(signal.SIGTERM, signal.SIG_IGN)\\ntime.sleep(60)')
     for name in ('a', 'b'):
-        child = family.start(Command(name, (sys.executable, '-S', '-c', code), Path(name + '.log')))
+        arguments = (sys.executable, '-S', '-c', code)
+        child = family.start(Command(name, arguments, Path(name + '.log')))
         print(child.pid, flush=True)
     time.sleep(60)
 """
