@@ -13,9 +13,7 @@ class AnchorPlace(Config):
     """One anchor on the wall or ceiling."""
 
     id: str = parameter(description='address that the anchor answers to')
-    position: tuple[float, float, float] = parameter(
-        description='antenna in map', unit='m'
-    )
+    position: tuple[float, float, float] = parameter(description='antenna in map', unit='m')
 
     @property
     def anchor(self) -> Anchor:

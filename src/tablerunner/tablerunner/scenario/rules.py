@@ -138,9 +138,7 @@ def _check_people(scenario: Scenario) -> None:
             way = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
             where = (leg + 1) % len(points)
             value = f'the way {list(here)} to {list(there)}'
-            _check_clear(
-                scenario, f'people[{index}].route[{where}]', way, person.radius, value
-            )
+            _check_clear(scenario, f'people[{index}].route[{where}]', way, person.radius, value)
 
 
 def _check_routes(scenario: Scenario) -> None:

@@ -58,9 +58,7 @@ class UwbErrors(Config):
     reply_delay: tuple[float, float] = parameter(
         (0.0008, 0.0012), description='least and most reply delay', unit='s', above=0.0, high=0.01
     )
-    power_std: float = parameter(
-        0.8, description='noise of a power reading', unit='dB', low=0.0
-    )
+    power_std: float = parameter(0.8, description='noise of a power reading', unit='dB', low=0.0)
 
     def check(self) -> None:
         """Refuse ranges that are upside down."""

@@ -68,7 +68,9 @@ class Bumper:
         if key in self._touching:
             return []
         self._touching.add(key)
-        return [Contact(stamp, owner.kind, owner.name, True, max(closing, 0.0) or speed, drive.pose)]
+        return [
+            Contact(stamp, owner.kind, owner.name, True, max(closing, 0.0) or speed, drive.pose)
+        ]
 
     def _people(
         self, stamp: int, drive: Drive, speed: float, people: Sequence[PersonState]

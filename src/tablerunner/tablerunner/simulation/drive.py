@@ -84,7 +84,10 @@ class Drive:
         angular = min(max(told.angular_rad_s, -limits.turn_rate), limits.turn_rate)
         self._set = Velocity(
             _approach(
-                self._set.linear_m_s, linear, limits.acceleration * dt_s, limits.deceleration * dt_s
+                self._set.linear_m_s,
+                linear,
+                limits.acceleration * dt_s,
+                limits.deceleration * dt_s,
             ),
             _approach(
                 self._set.angular_rad_s,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -134,7 +134,9 @@ class Crowd:
     """All people of a scenario."""
 
     def __init__(self, people: Sequence[Person], seed: int) -> None:
-        self._walkers = [Walker(person, stream(seed, f'person {person.name}')) for person in people]
+        self._walkers = [
+            Walker(person, stream(seed, f'person {person.name}')) for person in people
+        ]
         self.states = tuple(walker.state for walker in self._walkers)
 
     def step(self, dt_s: float, robot: Pose2, robot_radius_m: float) -> None:

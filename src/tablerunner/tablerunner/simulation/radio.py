@@ -52,11 +52,10 @@ class Radio:
         self._sight = Sight(scenario.outlines)
         self._tag_clock = self._clock(stream(seed, f'clock {scenario.tag_id}'))
         self._clocks = {
-            anchor.id: self._clock(stream(seed, f'clock {anchor.id}')) for anchor in scenario.anchors
+            anchor.id: self._clock(stream(seed, f'clock {anchor.id}'))
+            for anchor in scenario.anchors
         }
-        self._random = {
-            anchor.id: stream(seed, f'uwb {anchor.id}') for anchor in scenario.anchors
-        }
+        self._random = {anchor.id: stream(seed, f'uwb {anchor.id}') for anchor in scenario.anchors}
         self.bias_m: dict[str, float] = {}
         self.scale: dict[str, float] = {}
         for anchor_id, random in self._random.items():

@@ -43,9 +43,7 @@ class Sonar:
         self._least_sine = math.cos(self._errors.critical_incidence)
         self._turn = 0
 
-    def fire(
-        self, stamp: int, pose: Pose2, people: Sequence[PersonState]
-    ) -> UltrasonicSample:
+    def fire(self, stamp: int, pose: Pose2, people: Sequence[PersonState]) -> UltrasonicSample:
         """Return what the next sensor in turn hears, with base_link at `pose` in map."""
         mount = self._mounts[self._turn]
         self._turn = (self._turn + 1) % len(self._mounts)
