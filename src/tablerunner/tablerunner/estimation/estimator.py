@@ -1,0 +1,142 @@
+"""What every estimator of the robot's pose can do, whatever is inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from tablerunner.config import Config, parameter
+from tablerunner.odometry.motion import Motion, MotionNoise
+from tablerunner.types import Estimate, Innovation, Matrix, PoseSample, RangeSample, Vector
+
+Measurement = RangeSample | PoseSample
+"""What an estimator can be corrected by."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where an estimator begins: a pose, and range biases if they came out with it."""
+
+    stamp: int
+    pose: Vector  # (3,): x, y, heading of base_link in map
+    pose_covariance: Matrix  # (3, 3)
+    range_biases: Vector | None = None  # (anchors,)
+    covariance: Matrix | None = None  # (3 + anchors, 3 + anchors), pose then biases
+
+
+@dataclass(frozen=True)
+class EstimatorConfig(Config):
+    """Noise and gates; each estimator uses what applies to it."""
+
+    motion: MotionNoise = parameter(factory=MotionNoise, description='Noise of odometry')
+    scale_std: float = parameter(
+        0.01, description='Prior deviation of the wheels scale error', low=0.0, high=0.5
+    )
+    scale_walk: float = parameter(
+        1e-4,
+        unit='1/sqrt(m)',
+        description='Random walk of the scale error',
+        low=0.0,
+        high=0.1,
+        dynamic=True,
+    )
+    gyro_bias_std: float = parameter(
+        0.005,
+        unit='rad/s',
+        description='Prior deviation of what is left of the yaw rate bias',
+        low=0.0,
+        high=1.0,
+    )
+    gyro_bias_walk: float = parameter(
+        2e-4,
+        unit='rad/s/sqrt(s)',
+        description='Random walk of the yaw rate bias',
+        low=0.0,
+        high=0.1,
+        dynamic=True,
+    )
+    range_bias_common_std: float = parameter(
+        0.1,
+        unit='m',
+        description='Prior deviation of the range bias that all anchors share',
+        low=0.0,
+        high=5.0,
+    )
+    range_bias_std: float = parameter(
+        0.05,
+        unit='m',
+        description="Prior deviation of each anchor's own range bias",
+        low=0.0,
+        high=5.0,
+    )
+    range_bias_walk: float = parameter(
+        1e-3,
+        unit='m/sqrt(s)',
+        description='Random walk of each range bias',
+        low=0.0,
+        high=1.0,
+        dynamic=True,
+    )
+    default_range_std: float = parameter(
+        0.1,
+        unit='m',
+        description='Deviation of a range that comes without variance',
+        above=0.0,
+        high=5.0,
+        dynamic=True,
+    )
+    nlos_std: float = parameter(
+        0.5,
+        unit='m',
+        description='Added deviation of a range that is surely NLOS',
+        low=0.0,
+        high=20.0,
+        dynamic=True,
+    )
+    huber: float = parameter(
+        1.5,
+        description='Innovation in standard deviations beyond which it loses weight',
+        above=0.0,
+        high=100.0,
+        dynamic=True,
+    )
+    gate: float = parameter(
+        16.0,
+        description='Normalised innovation squared beyond which a range is refused',
+        above=0.0,
+        high=1e6,
+        dynamic=True,
+    )
+    pose_gate: float = parameter(
+        16.3,
+        description='The same for a pose or position (three numbers)',
+        above=0.0,
+        high=1e6,
+        dynamic=True,
+    )
+
+
+class Estimator(Protocol):
+    """Pure: takes an estimate, returns a new one; keeps nothing between calls."""
+
+    @property
+    def name(self) -> str:
+        """Name by which it is chosen."""
+        ...
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states, in order; x, y, heading first."""
+        ...
+
+    def start(self, start: Start) -> Estimate:
+        """Return the first estimate."""
+        ...
+
+    def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
+        """Return the estimate carried to `stamp` by a motion."""
+        ...
+
+    def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
+        """Return the estimate corrected by a measurement of its stamp, and what happened."""
+        ...

@@ -1,0 +1,315 @@
+"""The localiser: every measurement in, the pose in the map out."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablerunner.errors import CovarianceError
+from tablerunner.estimation.checks import check_pose, check_range
+from tablerunner.estimation.ekf import RANGE_SOURCE
+from tablerunner.estimation.estimator import Estimator, Start
+from tablerunner.estimation.localizer_config import LocalizerConfig
+from tablerunner.estimation.registry import ESTIMATORS
+from tablerunner.estimation.start_finder import StartFinder
+from tablerunner.estimation.status import LocalizerState, LocalizerStatus
+from tablerunner.estimation.timeline import Timeline
+from tablerunner.estimation.track import OdometryTrack, plausible
+from tablerunner.geometry.pose import Pose2
+from tablerunner.stream import Order, StampOrder
+from tablerunner.types import (
+    Anchor,
+    Estimate,
+    Innovation,
+    OdometrySample,
+    PoseSample,
+    RangeSample,
+    Refusal,
+    nanoseconds,
+    seconds,
+)
+
+ODOMETRY_SOURCE = 'odom'
+INITIAL_POSE_SOURCE = 'initialpose'
+_FEWEST_FOR_LOST = 15
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What one input led to."""
+
+    estimate: Estimate | None = None  # newest belief, if this input changed it
+    innovations: tuple[Innovation, ...] = ()
+    refusals: tuple[Refusal, ...] = ()
+
+
+class Localizer:
+    """Orders, checks and fuses measurements; finds its start; notices when it is lost.
+
+    The same inputs in the same order give the same outputs, bit for bit; and once the start is
+    known, inputs that arrive in another order (within `history`) lead to the same estimate.
+    """
+
+    def __init__(self, config: LocalizerConfig, anchors: tuple[Anchor, ...] = ()) -> None:
+        self.config = config
+        self._anchors: tuple[Anchor, ...] = ()
+        self._pending: PoseSample | None = None
+        self._clear()
+        self.set_anchors(anchors)
+        if config.initial_pose:
+            x, y, heading = config.initial_pose
+            covariance = np.diag(np.square(config.initial_pose_std))
+            self._pending = PoseSample(0, Pose2(x, y, heading), covariance, 'initial_pose')
+
+    def _clear(self) -> None:
+        self._track = OdometryTrack()
+        self._order = StampOrder()
+        self._timeline: Timeline | None = None
+        self._suspect: OdometrySample | None = None
+        self._lost = False
+        self._recent: deque[tuple[int, bool]] = deque()
+        self._accepted_stamp = 0
+        self._forget_start()
+
+    def _forget_start(self) -> None:
+        self._finder = StartFinder(
+            self.config.alignment, self.config.filter, self._anchors, self._lever_arm
+        )
+
+    @property
+    def _lever_arm(self) -> tuple[float, float, float]:
+        x, y, z = self.config.tag_position
+        return (x, y, z)
+
+    # -- configuration ------------------------------------------------------------------------
+
+    def configure(self, config: LocalizerConfig) -> None:
+        """Use other dynamic settings from now on; the estimate goes on."""
+        self.config = config
+        if self._timeline is not None:
+            self._timeline.estimator = self._new_estimator()
+
+    def set_anchors(self, anchors: tuple[Anchor, ...]) -> None:
+        """Use these anchors; other ones than before begin a new estimate at the same pose."""
+        if anchors == self._anchors:
+            return
+        self._anchors = anchors
+        self._forget_start()
+        if self._timeline is not None:
+            newest = self._timeline.newest
+            self._begin(Start(newest.stamp, newest.mean[:3], newest.pose_covariance))
+
+    def reset(self) -> None:
+        """Forget everything but anchors and settings."""
+        self._clear()
+
+    def _new_estimator(self) -> Estimator:
+        factory = ESTIMATORS[self.config.estimator]
+        return factory(self.config.filter, self._anchors, self._lever_arm)
+
+    # -- what is known --------------------------------------------------------------------------
+
+    @property
+    def status(self) -> LocalizerStatus:
+        """State of the localiser and what to say about it."""
+        if self._timeline is not None:
+            silent = seconds(self._timeline.newest.stamp - self._accepted_stamp)
+            silent = silent if self._accepted_stamp else 0.0
+            words = f'no measurement accepted for {silent:.1f} s' if silent > 1.0 else 'tracking'
+            return LocalizerStatus(LocalizerState.TRACKING, words, silent)
+        if not self._anchors:
+            return LocalizerStatus(LocalizerState.WAITING, 'no anchors yet')
+        if not len(self._track):
+            return LocalizerStatus(LocalizerState.WAITING, 'no odometry yet')
+        words = self._finder.words
+        if self._lost:
+            return LocalizerStatus(LocalizerState.LOST, f'lost; {words}')
+        state = LocalizerState.ALIGNING if self._finder.count else LocalizerState.WAITING
+        return LocalizerStatus(state, words)
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """Newest belief of the estimator; None before its start is known."""
+        return None if self._timeline is None else self._timeline.newest
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states of `estimate`; empty before its start is known."""
+        return () if self._timeline is None else self._timeline.estimator.state_names
+
+    @property
+    def map_to_odom(self) -> Pose2 | None:
+        """Pose of odom in map at the newest estimate; None before the start is known."""
+        if self._timeline is None:
+            return None
+        newest = self._timeline.newest
+        return newest.pose @ self._track.pose(newest.stamp).inverse()
+
+    def velocity(self) -> tuple[float, float]:
+        """Return forward speed [m/s] and turn rate [rad/s] of the newest odometry."""
+        if not len(self._track):
+            return 0.0, 0.0
+        return self._track.newest.linear_m_s, self._track.newest.angular_rad_s
+
+    # -- inputs -----------------------------------------------------------------------------------
+
+    def add_odometry(self, sample: OdometrySample) -> Outcome:
+        """Take odometry; the estimate moves on to its stamp."""
+        order = self._order.judge(sample.stamp)
+        if order is Order.ZERO or not (
+            sample.pose.is_finite
+            and math.isfinite(sample.linear_m_s)
+            and math.isfinite(sample.angular_rad_s)
+        ):
+            reason = 'zero stamp' if order is Order.ZERO else 'not finite'
+            return _refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
+        restarted: tuple[Refusal, ...] = ()
+        if order is Order.RESTARTED:
+            self._clear()
+            self._order.judge(sample.stamp)
+            restarted = (Refusal(sample.stamp, ODOMETRY_SOURCE, '', order.value),)
+        reason = self._odometry_fault(sample)
+        if reason:
+            return _refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
+        if self._timeline is not None:
+            self._timeline.add_odometry(sample)
+            return Outcome(self._timeline.newest)
+        self._track.add(sample)
+        self._track.trim(sample.stamp - nanoseconds(self.config.alignment.window))
+        if self._pending is not None and self._anchors:
+            pending, self._pending = self._pending, None
+            stamp = pending.stamp or sample.stamp
+            self._begin(Start(stamp, _vector(pending.pose), pending.covariance))
+            return Outcome(self.estimate, (), restarted)
+        return Outcome(None, (), restarted)
+
+    def add_range(self, sample: RangeSample) -> Outcome:
+        """Take a range: correct the estimate, or help to find its start."""
+        known = {anchor.anchor_id for anchor in self._anchors}
+        reason = check_range(sample, known) or self._place_fault(sample.stamp)
+        if reason:
+            return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
+        if self._timeline is not None:
+            innovation = self._timeline.add(sample)
+            if innovation is None:
+                return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, 'repeated')
+            self._watch(innovation)
+            return Outcome(self.estimate, (innovation,))
+        alignment = self._finder.add(sample, self._track)
+        if alignment is None:
+            return Outcome()
+        if alignment.certain:
+            self._begin(self._finder.start(alignment))
+            return Outcome(self.estimate)
+        return Outcome(self._finder.provisional(alignment))
+
+    def add_pose(self, sample: PoseSample) -> Outcome:
+        """Take a pose or a position without heading, as from a camera or a UWB-only fix."""
+        reason = check_pose(sample) or self._place_fault(sample.stamp)
+        if not reason and self._timeline is None:
+            reason = 'start not known yet'
+        if reason or self._timeline is None:
+            return _refused(sample.stamp, sample.source, '', reason)
+        innovation = self._timeline.add(sample)
+        if innovation is None:
+            return _refused(sample.stamp, sample.source, '', 'repeated')
+        self._watch(innovation)
+        return Outcome(self.estimate, (innovation,))
+
+    def set_pose(self, sample: PoseSample) -> Outcome:
+        """Begin anew at a pose that a user gives; it overrides whatever was believed."""
+        reason = check_pose(sample)
+        if not reason and not math.isfinite(sample.covariance[2, 2]):
+            reason = 'heading missing'
+        if not reason and not len(self._track):
+            self._pending = sample
+            return Outcome()
+        reason = reason or self._place_fault(sample.stamp)
+        if not reason and sample.stamp < self._track.oldest_stamp:
+            reason = 'older than the history'
+        if reason:
+            return _refused(sample.stamp, INITIAL_POSE_SOURCE, '', reason)
+        try:
+            self._begin(Start(sample.stamp, _vector(sample.pose), sample.covariance))
+        except CovarianceError as error:
+            return _refused(sample.stamp, INITIAL_POSE_SOURCE, '', str(error))
+        return Outcome(self.estimate)
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _begin(self, start: Start) -> None:
+        self._timeline = Timeline(
+            self._new_estimator(), self._track, start, nanoseconds(self.config.history)
+        )
+        self._lost = False
+        self._recent.clear()
+        self._accepted_stamp = start.stamp
+
+    def _place_fault(self, stamp: int) -> str:
+        """Return why a measurement of this stamp has no place beside odometry; '' if it has."""
+        if not len(self._track):
+            return 'no odometry yet'
+        if stamp > self._track.newest.stamp + nanoseconds(self.config.max_ahead):
+            return 'ahead of odometry'
+        if self._timeline is not None and not self._timeline.takes(stamp):
+            return 'older than the history'
+        return ''
+
+    def _odometry_fault(self, sample: OdometrySample) -> str:
+        track, config = self._track, self.config
+        if not len(track):
+            return ''
+        if track.holds(sample.stamp):
+            return 'repeated'
+        before = track.before(sample.stamp)
+        if before is None or (
+            self._timeline is not None and not self._timeline.takes(sample.stamp)
+        ):
+            return 'older than the history'
+        if plausible(before, sample, config.max_speed, config.max_turn_rate):
+            self._suspect = None
+            return ''
+        suspect, self._suspect = self._suspect, sample
+        if suspect is None or not plausible(
+            suspect, sample, config.max_speed, config.max_turn_rate
+        ):
+            return 'odometry jump'
+        self._adopt_origin(sample)
+        return 'odometry started from another origin'
+
+    def _adopt_origin(self, sample: OdometrySample) -> None:
+        """Go on from odometry that began anew elsewhere: the pose stays, the track is new."""
+        estimate, self._suspect = self.estimate, None
+        self._track = OdometryTrack()
+        self._track.add(sample)
+        self._forget_start()
+        if estimate is not None:
+            stamp = max(estimate.stamp, sample.stamp)
+            self._begin(Start(stamp, estimate.mean[:3], estimate.pose_covariance))
+
+    def _watch(self, innovation: Innovation) -> None:
+        """Count refusals at the gate; when most measurements contradict the pose, it is lost."""
+        if self.config.estimator == 'dead_reckoning':
+            return
+        if innovation.accepted:
+            self._accepted_stamp = max(self._accepted_stamp, innovation.stamp)
+        recent = self._recent
+        recent.append((innovation.stamp, innovation.accepted))
+        while recent[-1][0] - recent[0][0] > nanoseconds(self.config.lost_window):
+            recent.popleft()
+        refused = sum(not accepted for _, accepted in recent)
+        if len(recent) >= _FEWEST_FOR_LOST and refused > self.config.lost_share * len(recent):
+            self._timeline = None
+            self._lost = True
+            self._forget_start()
+
+
+def _vector(pose: Pose2) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.array([pose.x, pose.y, pose.heading])
+
+
+def _refused(stamp: int, source: str, key: str, reason: str) -> Outcome:
+    return Outcome(None, (), (Refusal(stamp, source, key, reason),))

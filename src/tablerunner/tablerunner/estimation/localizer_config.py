@@ -1,0 +1,87 @@
+"""Settings of the localiser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tablerunner.config import Config, parameter
+from tablerunner.errors import ConfigError
+from tablerunner.estimation.alignment import AlignmentConfig
+from tablerunner.estimation.estimator import EstimatorConfig
+from tablerunner.estimation.registry import ESTIMATORS
+
+
+@dataclass(frozen=True)
+class LocalizerConfig(Config):
+    """Everything that fusion_node and replay let a user set about estimation."""
+
+    estimator: str = parameter(
+        'ekf', description='Which estimator runs', choices=tuple(ESTIMATORS)
+    )
+    tag_position: tuple[float, ...] = parameter(
+        (0.0, 0.0, 1.1),
+        unit='m',
+        description='Tag antenna in base_link: x, y, z',
+        low=-5.0,
+        high=5.0,
+    )
+    initial_pose: tuple[float, ...] = parameter(
+        (), description='x [m], y [m], heading [rad] at the start; empty: found by driving'
+    )
+    initial_pose_std: tuple[float, ...] = parameter(
+        (0.1, 0.1, 0.1), description='Standard deviations of initial_pose', above=0.0, high=10.0
+    )
+    history: float = parameter(
+        1.0, unit='s', description='How late a measurement may come', low=0.1, high=10.0
+    )
+    max_ahead: float = parameter(
+        0.2,
+        unit='s',
+        description='How far a measurement may be ahead of odometry',
+        low=0.0,
+        high=2.0,
+    )
+    max_speed: float = parameter(
+        3.0,
+        unit='m/s',
+        description='Odometry faster than this counts as a jump',
+        above=0.0,
+        high=50.0,
+    )
+    max_turn_rate: float = parameter(
+        10.0,
+        unit='rad/s',
+        description='Odometry turning faster counts as a jump',
+        above=0.0,
+        high=100.0,
+    )
+    lost_window: float = parameter(
+        3.0,
+        unit='s',
+        description='Time over which refused ranges are counted',
+        above=0.0,
+        high=60.0,
+        dynamic=True,
+    )
+    lost_share: float = parameter(
+        0.7,
+        description='Share of refused ranges from which the robot counts as lost',
+        above=0.0,
+        high=1.0,
+        dynamic=True,
+    )
+    filter: EstimatorConfig = parameter(factory=EstimatorConfig, description='Noise and gates')
+    alignment: AlignmentConfig = parameter(
+        factory=AlignmentConfig, description='How the start is found'
+    )
+
+    def check(self) -> None:
+        """Check the lengths of the lists."""
+        if len(self.tag_position) != 3:
+            raise ConfigError('tag_position', self.tag_position, '3 numbers: x, y, z [m]')
+        if len(self.initial_pose) not in (0, 3):
+            raise ConfigError(
+                'initial_pose', self.initial_pose, 'nothing, or 3 numbers: x [m], y [m], yaw [rad]'
+            )
+        if len(self.initial_pose_std) != 3:
+            raise ConfigError('initial_pose_std', self.initial_pose_std, '3 numbers')

@@ -1,0 +1,1 @@
+"""Motion and measurement models with their Jacobians, as plain functions."""

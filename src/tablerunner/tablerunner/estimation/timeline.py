@@ -1,0 +1,126 @@
+"""Measurements in order of their stamps, however late they come.
+
+The estimate after each of the last steps is kept. A measurement that belongs before some of them
+is put in its place and everything after it is worked out again, so that the result does not
+depend on the order of arrival: late data in place equal on-time data, to the last bit.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass, field
+
+from tablerunner.estimation.estimator import Estimator, Measurement, Start
+from tablerunner.estimation.track import OdometryTrack
+from tablerunner.types import Estimate, Innovation, OdometrySample, RangeSample
+
+_Key = tuple[int, int, str]  # stamp, rank, source key: a total order, whatever arrives first
+
+
+@dataclass(slots=True)
+class _Entry:
+    key: _Key
+    measurement: Measurement | None  # None: an odometry sample, prediction only
+    after: Estimate = field(init=False)
+
+
+class Timeline:
+    """Runs an estimator along odometry and measurements over a sliding history.
+
+    Parameters
+    ----------
+    estimator : Estimator
+    track : OdometryTrack
+        Odometry; samples are added through `add_odometry`.
+    start : Start
+        Where to begin; the track must reach back to its stamp.
+    history : int
+        How far back a measurement may belong [ns].
+    """
+
+    def __init__(
+        self, estimator: Estimator, track: OdometryTrack, start: Start, history: int
+    ) -> None:
+        self.estimator = estimator
+        self._track = track
+        self._history = history
+        first = _Entry((start.stamp, -1, ''), None)
+        first.after = estimator.start(start)
+        self._entries = [first]
+        self._keys = [first.key]
+        for stamp in track.stamps_after(start.stamp):
+            self._insert(_Entry((stamp, 0, ''), None))
+        self._run(1)
+
+    @property
+    def newest(self) -> Estimate:
+        """The estimate at the newest stamp."""
+        return self._entries[-1].after
+
+    @property
+    def oldest_stamp(self) -> int:
+        """Stamp of the oldest estimate that is kept: nothing earlier can be taken."""
+        return self._keys[0][0]
+
+    def takes(self, stamp: int) -> bool:
+        """Whether the history reaches back to this stamp."""
+        return stamp > self.oldest_stamp
+
+    def add_odometry(self, sample: OdometrySample) -> None:
+        """Add an odometry sample and work out again what came after the one before it."""
+        before = self._track.before(sample.stamp)
+        self._track.add(sample)
+        self._insert(_Entry((sample.stamp, 0, ''), None))
+        since = sample.stamp if before is None else before.stamp
+        # Whatever lay beyond the sample before was predicted on held velocity.
+        self._run(bisect_right(self._keys, (since, 99, '')))
+        self._trim()
+
+    def add(self, measurement: Measurement) -> Innovation | None:
+        """Add a measurement; return what it did, None if the same one is already there."""
+        key = _key(measurement)
+        position = bisect_left(self._keys, key)
+        if position < len(self._keys) and self._keys[position] == key:
+            return None
+        index = self._insert(_Entry(key, measurement))
+        innovation = self._run(index)
+        self._trim()
+        return innovation
+
+    def _insert(self, entry: _Entry) -> int:
+        index = bisect_right(self._keys, entry.key)
+        self._keys.insert(index, entry.key)
+        self._entries.insert(index, entry)
+        return index
+
+    def _run(self, index: int) -> Innovation | None:
+        """Work out all entries from `index` on; return the innovation of the first."""
+        first = None
+        for position in range(max(index, 1), len(self._entries)):
+            entry, estimate = self._entries[position], self._entries[position - 1].after
+            stamp = entry.key[0]
+            if stamp > estimate.stamp:
+                motion = self._track.motion(estimate.stamp, stamp)
+                estimate = self.estimator.predict(estimate, motion, stamp)
+            innovation = None
+            if entry.measurement is not None:
+                estimate, innovation = self.estimator.update(estimate, entry.measurement)
+            entry.after = estimate
+            if position == index:
+                first = innovation
+        return first
+
+    def _trim(self) -> None:
+        horizon = self._keys[-1][0] - self._history
+        drop = bisect_right(self._keys, (horizon, 99, '')) - 1
+        if drop > 0:
+            del self._keys[:drop]
+            del self._entries[:drop]
+        # An interval that ends in the history may begin before it.
+        self._track.trim(self._keys[0][0])
+
+
+def _key(measurement: Measurement) -> _Key:
+    if isinstance(measurement, RangeSample):
+        return (measurement.stamp, 1, f'{measurement.anchor_id}/{measurement.tag_id}')
+    return (measurement.stamp, 2, measurement.source)
