@@ -51,9 +51,7 @@ class ConfigError(TablerunnerError):
             shown = shown[:117] + '...'
         return ': '.join([*parts, f'got {shown}, expected {self.expected}'])
 
-    def located(
-        self, source: str = '', line: int | None = None, prefix: str = ''
-    ) -> ConfigError:
+    def located(self, source: str = '', line: int | None = None, prefix: str = '') -> ConfigError:
         """Return the same error with its place filled in where it was not known."""
         if prefix and self.field and not self.field.startswith('['):
             field = f'{prefix}.{self.field}'
@@ -82,3 +80,7 @@ class BagError(TablerunnerError):
 
 class PlanningError(TablerunnerError):
     """No way leads to the goal, or the goal is not a place where the robot can stand."""
+
+
+class MissionError(TablerunnerError):
+    """A mission cannot be taken on: the robot is busy, or there is nothing to do."""

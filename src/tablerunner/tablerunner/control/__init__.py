@@ -1,0 +1,61 @@
+"""Driving: planning, following a path, missions, and the safety stop; free of estimation."""
+
+from tablerunner.control.braking import largest_speed, stopping_distance
+from tablerunner.control.controller import Controller, Drive
+from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
+from tablerunner.control.floor_map import Disc, FloorMap
+from tablerunner.control.follower import FollowerConfig, PurePursuit
+from tablerunner.control.limits import VelocityLimits
+from tablerunner.control.mission import Mission, MissionConfig
+from tablerunner.control.path import Path
+from tablerunner.control.planner import Planner, PlannerConfig
+from tablerunner.control.room import (
+    floor_map,
+    home_of,
+    limits_within,
+    make_planner,
+    sensor_mounts,
+    table_stop,
+)
+from tablerunner.control.safety import (
+    Localisation,
+    SafetyConfig,
+    SafetyDecision,
+    SafetyState,
+    SafetyStop,
+)
+
+CONTROLLERS = ('pure_pursuit',)  # names of the path controllers; 'fuzzy' joins later
+
+__all__ = [
+    'CONTROLLERS',
+    'Controller',
+    'Destination',
+    'Disc',
+    'Drive',
+    'FloorMap',
+    'FollowerConfig',
+    'Localisation',
+    'Mission',
+    'MissionConfig',
+    'MissionState',
+    'MissionStatus',
+    'Path',
+    'Planner',
+    'PlannerConfig',
+    'PurePursuit',
+    'SafetyConfig',
+    'SafetyDecision',
+    'SafetyState',
+    'SafetyStop',
+    'Situation',
+    'VelocityLimits',
+    'floor_map',
+    'home_of',
+    'largest_speed',
+    'limits_within',
+    'make_planner',
+    'sensor_mounts',
+    'stopping_distance',
+    'table_stop',
+]

@@ -1,0 +1,46 @@
+"""How far a robot runs before it stands, and how fast it may be to stand in time.
+
+With speed v, delay t until the brakes bite, deceleration a, and something that comes nearer by
+itself at speed u until the robot stands, the gap closes by
+
+    d(v) = v t + v^2 / (2 a) + u (t + v / a)                                              (1)
+
+and the largest speed whose d(v) fits into a free way F is
+
+    v(F) = a (-q + sqrt(q^2 + 2 (F - u t) / a)),   q = t + u / a                           (2)
+
+(zero when F <= u t). docs/safety.md.
+"""
+
+from __future__ import annotations
+
+import math
+
+
+def stopping_distance(
+    speed: float, delay: float, deceleration: float, approach: float = 0.0
+) -> float:
+    """Return by how much a gap closes until the robot stands [m], (1).
+
+    Parameters
+    ----------
+    speed : float
+        Of the robot, at least 0 [m/s].
+    delay : float
+        From the reading to the brakes [s].
+    deceleration : float
+        Above 0 [m/s^2].
+    approach : float
+        Speed at which the other comes nearer [m/s].
+    """
+    brake = speed / deceleration
+    return speed * delay + 0.5 * speed * brake + approach * (delay + brake)
+
+
+def largest_speed(way: float, delay: float, deceleration: float, approach: float = 0.0) -> float:
+    """Return the speed from which the robot stands within `way` [m/s], (2); arguments as above."""
+    room = way - approach * delay
+    if room <= 0.0:
+        return 0.0
+    wait = delay + approach / deceleration
+    return deceleration * (math.sqrt(wait**2 + 2.0 * room / deceleration) - wait)

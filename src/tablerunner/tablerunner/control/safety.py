@@ -1,0 +1,326 @@
+"""The safety stop: the last word on every velocity before it reaches the wheels.
+
+It knows no map and no plan: only what was asked for, what the ultrasonic sensors hear, how well
+the robot knows where it is, and how old all of that is. docs/safety.md has the rules.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from tablerunner.control.braking import largest_speed, stopping_distance
+from tablerunner.control.echoes import EchoMemory
+from tablerunner.control.limits import VelocityLimits
+from tablerunner.control.safety_config import SafetyConfig
+from tablerunner.geometry.pose import Pose2
+from tablerunner.types import Refusal, UltrasonicSample, Vector, Velocity, seconds
+
+_STEP_M = 0.02  # spacing of the places that are tried along the way ahead
+_TURN_RATE_MIN = 1e-3
+
+
+class SafetyState(str, Enum):
+    """What the safety stop does with the command."""
+
+    CLEAR = 'clear'
+    SLOW = 'slow'
+    STOP = 'stop'
+
+
+@dataclass(frozen=True, slots=True)
+class Localisation:
+    """How well the robot knows where it is.
+
+    ``stamp`` is that of the newest pose (0: none yet); the standard deviations are the largest of
+    the position ellipse [m] and of the heading [rad].
+    """
+
+    stamp: int = 0
+    position_std_m: float = math.inf
+    heading_std_rad: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyDecision:
+    """What goes to the wheels, and why.
+
+    Attributes
+    ----------
+    velocity : Velocity
+    state : SafetyState
+    reasons : tuple of str
+        In words; empty when clear.
+    blocked : bool
+        Whether something in the way is among the reasons.
+    free_way_m : float
+        Way ahead on the arc that was asked for; inf: nothing heard.
+    stopping_distance_m : float
+        What standing takes from the speed that is put out.
+    obstacle : tuple of float or None
+        The nearest thing in the way, in base_link [m].
+    """
+
+    velocity: Velocity
+    state: SafetyState
+    reasons: tuple[str, ...] = ()
+    blocked: bool = False
+    free_way_m: float = math.inf
+    stopping_distance_m: float = 0.0
+    obstacle: tuple[float, float] | None = None
+
+
+class SafetyStop:
+    """Decides, step by step, what of a command may reach the wheels.
+
+    Deterministic: the same inputs in the same order give the same decisions. All stamps are of one
+    clock, given by the caller.
+
+    Parameters
+    ----------
+    config : SafetyConfig
+    limits : VelocityLimits
+    mounts : dict of str to Pose2
+        Pose of every ultrasonic sensor in base_link by frame name; each must be heard.
+    """
+
+    def __init__(
+        self, config: SafetyConfig, limits: VelocityLimits, mounts: dict[str, Pose2]
+    ) -> None:
+        self.config = config
+        self.limits = limits
+        self._echoes = EchoMemory(mounts, config.hold_time)
+        self._now = 0
+        self._last = Velocity()
+        self._stopped = False
+        self._clear_since: int | None = None
+        self._reversed_m = 0.0
+        self._emergency: str | None = None
+
+    def add_reading(self, sample: UltrasonicSample, now: int) -> Refusal | None:
+        """Take an ultrasonic reading; a refused one counts as silence."""
+        return self._echoes.add(sample, now)
+
+    def trigger(self, reason: str = 'emergency stop') -> None:
+        """Stop at once and stay so until `release`."""
+        self._emergency = reason
+
+    def release(self) -> bool:
+        """End an emergency stop; return whether there was one."""
+        held = self._emergency is not None
+        self._emergency = None
+        return held
+
+    @property
+    def emergency(self) -> str | None:
+        """Why the emergency stop holds; None: it does not."""
+        return self._emergency
+
+    def reset(self) -> None:
+        """Forget readings and times (time went back); an emergency stop stays."""
+        self._echoes.reset()
+        self._now, self._last, self._stopped = 0, Velocity(), False
+        self._clear_since = None
+
+    def step(
+        self,
+        now: int,
+        command: Velocity | None,
+        command_stamp: int,
+        localisation: Localisation,
+        motion: Velocity | None = None,
+    ) -> SafetyDecision:
+        """Return the decision of this instant.
+
+        Parameters
+        ----------
+        now : int
+            Stamp of this step [ns].
+        command : Velocity or None
+            The last command; None: none yet.
+        command_stamp : int
+            When it came [ns].
+        localisation : Localisation
+        motion : Velocity or None
+            How the robot moves, measured; None: as was last decided.
+        """
+        dt = seconds(now - self._now) if self._now else 0.0
+        self._now = now
+        self._echoes.move(self._last if motion is None else motion, dt)
+        self._echoes.forget(now)
+        if self._last.linear_m_s < 0:
+            self._reversed_m -= self._last.linear_m_s * dt
+        elif self._last.linear_m_s > 0:
+            self._reversed_m = 0.0
+        reasons = self._halts(now, command, command_stamp, localisation)
+        if reasons or command is None:
+            self._last = Velocity()
+            self._stopped, self._clear_since = True, None
+            return SafetyDecision(Velocity(), SafetyState.STOP, tuple(reasons))
+        decision = self._regulate(now, command, localisation, min(max(dt, 0.0), 0.2))
+        self._last = decision.velocity
+        return decision
+
+    def _halts(
+        self,
+        now: int,
+        command: Velocity | None,
+        command_stamp: int,
+        localisation: Localisation,
+    ) -> list[str]:
+        """Return the reasons to stand still whatever is in the way."""
+        config, reasons = self.config, []
+        if self._emergency is not None:
+            reasons.append(self._emergency)
+        if command is None or seconds(now - command_stamp) > config.command_timeout:
+            reasons.append('no command')
+        elif not (math.isfinite(command.linear_m_s) and math.isfinite(command.angular_rad_s)):
+            reasons.append('command is not finite')
+        reasons.extend(
+            f'{sensor} silent'
+            for sensor in self._echoes.mounts
+            if not self._echoes.age_s(sensor, now) <= config.ultrasonic_timeout
+        )
+        if config.require_pose:
+            if localisation.stamp <= 0:
+                reasons.append('no pose')
+            elif seconds(now - localisation.stamp) > config.pose_timeout:
+                reasons.append('pose too old')
+            elif not localisation.position_std_m <= config.position_std_stop:
+                reasons.append('position too uncertain')
+        return reasons
+
+    def _regulate(
+        self, now: int, command: Velocity, localisation: Localisation, dt: float
+    ) -> SafetyDecision:
+        config = self.config
+        wanted = self.limits.clamp(command)
+        reasons: list[str] = []
+        top, way, obstacle, blocked = math.inf, math.inf, None, False
+        if wanted.linear_m_s > 0:
+            top, way, obstacle, sensor = self._allowed(now, wanted)
+            if self._hold(now, top):
+                top = 0.0
+            if top < wanted.linear_m_s:
+                blocked = True
+                reasons.append(f'obstacle: {sensor}' if sensor else 'way not yet clear again')
+        else:
+            self._hold(now, math.inf)
+        uncertain = config.require_pose and not (
+            localisation.position_std_m <= config.position_std_slow
+            and localisation.heading_std_rad <= config.heading_std_slow
+        )
+        if uncertain and abs(wanted.linear_m_s) > config.uncertain_speed:
+            top = min(top, config.uncertain_speed)
+            reasons.append('pose uncertain')
+        if wanted.linear_m_s < 0 and self._reversed_m >= config.reverse_distance:
+            top = 0.0
+            reasons.append('backed up far enough unseen')
+        velocity = self._output(wanted, top, dt)
+        state = SafetyState.CLEAR
+        if reasons:
+            state = SafetyState.STOP if top <= 0.0 else SafetyState.SLOW
+        return SafetyDecision(
+            velocity,
+            state,
+            tuple(reasons),
+            blocked,
+            way,
+            stopping_distance(abs(velocity.linear_m_s), config.delay, config.deceleration),
+            obstacle,
+        )
+
+    def _output(self, wanted: Velocity, top: float, dt: float) -> Velocity:
+        """Return `wanted` slowed to `top`; speeding up takes its time, slowing down does not."""
+        linear, angular = wanted.linear_m_s, wanted.angular_rad_s
+        if abs(linear) > top:
+            if top > 0.0:
+                angular *= top / abs(linear)
+            else:
+                near = self.config.turn_rate_near
+                angular = min(max(angular, -near), near)
+            linear = math.copysign(top, linear)
+        last = self._last.linear_m_s
+        gain = self.limits.max_acceleration * dt
+        from_speed = abs(last) if last * linear > 0 else 0.0
+        if abs(linear) > from_speed + gain:
+            linear = math.copysign(from_speed + gain, linear)
+        return Velocity(linear, angular)
+
+    def _hold(self, now: int, top: float) -> bool:
+        """Return whether a stop for something in the way lasts, given the speed allowed now."""
+        if top <= 0.0:
+            self._stopped, self._clear_since = True, None
+            return True
+        if not self._stopped:
+            return False
+        if top < self.config.release_speed:
+            self._clear_since = None
+            return True
+        if self._clear_since is None:
+            self._clear_since = now
+        if seconds(now - self._clear_since) < self.config.clear_time:
+            return True
+        self._stopped, self._clear_since = False, None
+        return False
+
+    def _allowed(
+        self, now: int, wanted: Velocity
+    ) -> tuple[float, float, tuple[float, float] | None, str]:
+        """Return the allowed speed, the free way, and what ends it and who heard it."""
+        config = self.config
+        points, ages, sensors = self._echoes.points(now)
+        if len(points) == 0:
+            return math.inf, math.inf, None, ''
+        ways = self._free_ways(points, wanted)
+        best_speed, best = math.inf, -1
+        for index in np.flatnonzero(np.isfinite(ways)):
+            way = float(ways[index]) - config.margin
+            static = largest_speed(way, config.delay, config.deceleration)
+            closing = way - config.approach_speed * float(ages[index])
+            moving = largest_speed(
+                closing, config.delay, config.deceleration, config.approach_speed
+            )
+            speed = max(moving, min(static, config.creep_speed))
+            if speed < best_speed:
+                best_speed, best = speed, int(index)
+        if best < 0:
+            return math.inf, math.inf, None, ''
+        obstacle = (float(points[best, 0]), float(points[best, 1]))
+        return best_speed, float(ways[best]), obstacle, sensors[best]
+
+    def _free_ways(self, points: Vector, wanted: Velocity) -> Vector:
+        """Return how far the hull can go along the wanted arc before it meets each point [m].
+
+        The hull is a disc grown by the side margin. A point already inside the grown disc counts
+        only if the robot moves towards it: a wall alongside must not hold a robot that leaves it.
+        """
+        config = self.config
+        radius = config.footprint_radius + config.side_margin
+        reach = (
+            0.1
+            + config.margin
+            + stopping_distance(
+                self.limits.max_speed, config.delay, config.deceleration, config.approach_speed
+            )
+            + config.approach_speed * config.ultrasonic_timeout
+        )
+        along = np.arange(0.0, reach + _STEP_M, _STEP_M)
+        curvature = wanted.angular_rad_s / wanted.linear_m_s
+        turned = along * curvature
+        if abs(curvature) < _TURN_RATE_MIN:
+            centres = np.column_stack([along, np.zeros_like(along)])
+        else:
+            centres = np.column_stack([np.sin(turned), 1.0 - np.cos(turned)]) / curvature
+        # More than half a turn: the way beyond is not where the robot will be next.
+        centres = centres[np.abs(turned) <= math.pi]
+        gap = np.linalg.norm(points[:, None, :] - centres[None], axis=-1)
+        meets = gap < radius
+        inside = meets[:, 0]
+        leaving = inside & (points[:, 0] <= 0.1 * np.maximum(gap[:, 0], 1e-9))
+        meets[leaving] = False
+        first = np.argmax(meets, axis=1)
+        return np.where(meets.any(axis=1), along[first], np.inf)
