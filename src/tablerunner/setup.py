@@ -7,7 +7,7 @@ PACKAGE = 'tablerunner'
 setup(
     name=PACKAGE,
     version='0.1.0',
-    description='Core library of the Tablerunner delivery robot: localisation, control, simulation; no ROS inside',
+    description='Core library of the Tablerunner delivery robot, without ROS',
     maintainer='Tablerunner maintainers',
     maintainer_email='maintainers@tablerunner.example',
     license='Apache-2.0',

@@ -9,7 +9,7 @@ PACKAGE = 'tablerunner_bringup'
 setup(
     name=PACKAGE,
     version='0.1.0',
-    description='Launcher, launch files, parameters, scenarios, bag recorder and player of Tablerunner',
+    description='Launcher, parameters, scenarios, bag recorder and player of Tablerunner',
     maintainer='Tablerunner maintainers',
     maintainer_email='maintainers@tablerunner.example',
     license='Apache-2.0',

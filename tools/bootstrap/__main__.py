@@ -1,4 +1,4 @@
-"""Set the workspace up: `python3 tools/bootstrap`, which the Makefile calls before everything else.
+"""Set the workspace up: `python3 tools/bootstrap`, which the Makefile calls before all else.
 
 Keep this file readable by old Pythons: it is the one that tells their users so.
 """

@@ -1,6 +1,6 @@
-"""What a machine must have before the set-up starts: each check says in one sentence what is missing.
+"""What a machine must have before the set-up starts; each check says what is missing.
 
-Every check takes what it looks at as arguments, so that the tests can show it a machine that lacks it.
+Every check takes what it looks at as arguments, so that tests can show it a machine that lacks it.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import platform
 import shutil
 import sys
 import sysconfig
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Callable, Mapping
 
 from bootstrap.errors import SetupError
 
 GIGABYTE = 1024**3
-# The environment takes 0.7 GB and the build 0.1 GB; pip keeps the downloads a second time for a while.
+# The environment takes 0.7 GB, the build 0.1 GB, and pip keeps the downloads for a while.
 NEEDED_SPACE = 2 * GIGABYTE
 OLDEST_GLIBC = (2, 28)
 
@@ -56,8 +56,8 @@ def check_system(
     if name != 'glibc' or numbers < OLDEST_GLIBC:
         found = f'{name} {version}'.strip() or 'another C library'
         raise SetupError(
-            f'The ROS 2 packages of the set-up need glibc 2.28 or newer, this machine has {found}: '
-            'use a newer distribution (Debian 10, Ubuntu 20.04, RHEL 8 or later).'
+            f'The ROS 2 packages of the set-up need glibc 2.28 or newer, this machine has '
+            f'{found}: use a newer distribution (Debian 10, Ubuntu 20.04, RHEL 8 or later).'
         )
 
 
@@ -117,7 +117,8 @@ def check_compilers(
         names = ' '.join(dict.fromkeys(packages))
         raise SetupError(
             f'Building the messages needs {_listed(missing)}, not found here: install what is '
-            f'missing (on Debian and Ubuntu: sudo apt install {names}), then run the command again.'
+            f'missing (on Debian and Ubuntu: sudo apt install {names}), then run the command '
+            'again.'
         )
 
 

@@ -1,4 +1,4 @@
-"""The virtual environment .venv: ROS 2 wheels, Python packages and tools, as the lock file pins them."""
+"""The virtual environment .venv: ROS 2 wheels, Python packages and tools, as locked."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ import re
 import shutil
 import sys
 import sysconfig
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Callable, Mapping
 
 from bootstrap import process, stamps, wheels
 from bootstrap.errors import SetupError
 from bootstrap.progress import Progress
 
-# What builds the few packages that are published as source only. They are installed first, from the
-# same lock, and pip is told to use them: by itself it would fetch the newest ones, unpinned.
+# What builds the few packages that are published as source only. They are installed first, from
+# the same lock, and pip is told to use them: by itself it would fetch the newest ones, unpinned.
 BUILDERS = ('setuptools', 'wheel', 'packaging')
 SOURCE_ONLY = 'empy'
+
+# Change it when the way an environment is made changes: existing ones are then made anew.
+RECIPE = '1'
 
 _NO_NETWORK = re.compile(
     r'NewConnectionError|Failed to establish a new connection|name resolution|ProxyError|'
@@ -46,9 +49,8 @@ class Environment:
 
     def wanted(self) -> str:
         """Return the stamp that the environment should have."""
-        words = [str(self.root), os.path.realpath(self._base), platform.python_version()]
-        here = Path(__file__)
-        return stamps.digest(words, [self.lock, here, here.with_name('wheels.py')])
+        words = [RECIPE, str(self.root), os.path.realpath(self._base), platform.python_version()]
+        return stamps.digest(words, [self.lock])
 
     def is_current(self) -> bool:
         """Say whether the environment is there, whole, and what the lock file says."""

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 
 class SetupError(Exception):
-    """Something is missing or went wrong; the message says what, and what to do, in one sentence."""
+    """Something is missing or went wrong; the message says what, and what to do."""

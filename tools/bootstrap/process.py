@@ -6,8 +6,8 @@ import os
 import selectors
 import signal
 import subprocess
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Callable, Mapping, Sequence
 
 PATIENCE = 5.0
 
@@ -66,8 +66,7 @@ def tail(log: Path, lines: int = 25) -> str:
 
 
 def _follow(process: subprocess.Popen[bytes], sink: int, on_line: Callable[[str], None]) -> None:
-    assert process.stdout is not None
-    pipe = process.stdout.fileno()
+    pipe = process.stdout.fileno()  # type: ignore[union-attr]  # it is a pipe, see above
     rest = b''
     with selectors.DefaultSelector() as selector:
         selector.register(pipe, selectors.EVENT_READ)

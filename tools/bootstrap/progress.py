@@ -12,7 +12,7 @@ HEARTBEAT = 20.0
 
 
 class Progress:
-    """Print a line for each step; on a terminal the line of the running step is kept up to date."""
+    """Print a line for each step; on a terminal the running step's is kept up to date."""
 
     def __init__(self, total: int, stream: TextIO = sys.stderr) -> None:
         self._total = total

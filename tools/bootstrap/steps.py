@@ -135,5 +135,5 @@ def _say_waiting() -> None:
     print('another set-up is running in this folder: waiting for it ...', file=sys.stderr)
 
 
-def _interrupt(number: int, frame: object) -> None:
+def _interrupt(_number: int, _frame: object) -> None:
     raise KeyboardInterrupt

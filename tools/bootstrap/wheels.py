@@ -1,4 +1,4 @@
-"""Repair of the ROS 2 wheels: their exported CMake files name folders of the machine they were built on."""
+"""Repair of the ROS 2 wheels: their CMake files name folders of the machine they come from."""
 
 from __future__ import annotations
 
