@@ -9,6 +9,9 @@ from tablerunner.messages.stamp import stamp_from_message
 from tablerunner.types import Refusal, WheelSample
 
 SOURCE = 'joint_states'
+LEFT_JOINT = 'left_wheel_joint'
+RIGHT_JOINT = 'right_wheel_joint'
+"""Names of the drive wheels' joints unless a parameter says otherwise."""
 
 
 def wheels_from_message(
