@@ -71,6 +71,9 @@ TOPICS: dict[str, TopicQos] = {
     'cmd_vel_nav': _RELIABLE_1,
     'cmd_vel': _RELIABLE_1,
     'ground_truth': _RELIABLE_10,
+    'people': _RELIABLE_10,
+    # Who comes late must hear of every touch: a demo fails on one.
+    'contacts': TopicQos(reliable=True, depth=50, subscriber_depth=50, latched=True),
     'tf': TopicQos(reliable=True, depth=100, subscriber_depth=100),
     'tf_static': TopicQos(reliable=True, depth=1, subscriber_depth=100, latched=True),
     'diagnostics': TopicQos(reliable=True, depth=10, subscriber_depth=50),

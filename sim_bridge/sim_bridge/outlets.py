@@ -1,0 +1,90 @@
+"""The topics that the simulated robot publishes: one outlet per kind of sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseArray
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState, MagneticField, Range
+
+from sim_bridge.convert import contact_to_message, people_to_message, truth_to_message
+from sim_bridge.params import BridgeConfig
+from tablerunner.scenario import RobotGeometry
+from tablerunner.simulation import Contact, PersonState, Sample, Truth
+from tablerunner.types import (
+    ExchangeSample,
+    ImuSample,
+    MagneticSample,
+    UltrasonicSample,
+    WheelSample,
+)
+from tablerunner_interfaces.msg import UwbExchange
+from tablerunner_ros.conversions.exchange import exchange_to_message
+from tablerunner_ros.conversions.imu import imu_to_message, magnetic_to_message
+from tablerunner_ros.conversions.stamp import fill_stamp
+from tablerunner_ros.conversions.ultrasonic import ultrasonic_to_message
+from tablerunner_ros.conversions.wheels import wheels_to_message
+from tablerunner_ros.qos import qos_for
+
+
+class Outlets:
+    """Publishers of the simulated robot.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    config : BridgeConfig
+    robot : RobotGeometry
+        Its ultrasonic sensors have a topic each, ``ultrasonic/NAME``.
+    """
+
+    def __init__(self, node: Node, config: BridgeConfig, robot: RobotGeometry) -> None:
+        self._config = config
+
+        def topic(type_: type[Any], name: str) -> Callable[[Any], None]:
+            return node.create_publisher(type_, name, qos_for(name)).publish
+
+        self._clock = topic(Clock, 'clock')
+        self._people = topic(PoseArray, 'people')
+        exchanges = topic(UwbExchange, 'uwb/exchanges')
+        wheels = topic(JointState, 'joint_states')
+        imu = topic(Imu, 'imu/data')
+        magnetic = topic(MagneticField, 'imu/mag')
+        truth = topic(Odometry, 'ground_truth')
+        contacts = topic(DiagnosticStatus, 'contacts')
+        sonars = {
+            mount.frame: topic(Range, f'ultrasonic/{mount.name}') for mount in robot.ultrasonics
+        }
+        joints = (config.left_joint, config.right_joint)
+        frames = (config.map_frame, config.base_frame)
+        self._by_type: dict[type[Any], Callable[[Any], None]] = {
+            ExchangeSample: lambda s: exchanges(exchange_to_message(s, config.tag_frame)),
+            WheelSample: lambda s: wheels(wheels_to_message(s, *joints)),
+            ImuSample: lambda s: imu(imu_to_message(s, config.imu_frame)),
+            MagneticSample: lambda s: magnetic(magnetic_to_message(s, config.imu_frame)),
+            UltrasonicSample: lambda s: sonars[s.sensor](ultrasonic_to_message(s)),
+            Truth: lambda s: truth(truth_to_message(s, *frames)),
+            Contact: lambda s: contacts(contact_to_message(s)),
+        }
+
+    def publish_clock(self, now_ns: int) -> None:
+        """Publish the simulated time."""
+        message = Clock()
+        fill_stamp(message.clock, now_ns)
+        self._clock(message)
+
+    def publish_samples(self, samples: Iterable[Sample]) -> None:
+        """Publish each sample that has a topic."""
+        for sample in samples:
+            publish = self._by_type.get(type(sample))
+            if publish is not None:
+                publish(sample)
+
+    def publish_people(self, now_ns: int, people: Iterable[PersonState]) -> None:
+        """Publish where everybody is."""
+        self._people(people_to_message(now_ns, people, self._config.map_frame))
