@@ -1,1 +1,1 @@
-"""What every Tablerunner node shares: parameters from dataclasses, messages to records, QoS, diagnostics."""
+"""What every Tablerunner node shares: parameters, messages to records, QoS, diagnostics."""

@@ -2,8 +2,8 @@
 
 One status per stream (``NODE: uwb/ranges``) and one for the node itself (``NODE``):
 
-- OK: nothing was refused since the last report, and what should arrive arrives;
-- WARN: something was refused since the last report, or the stream has not begun;
+- OK: nothing was refused since the last report, or only what an estimator's gate is there for;
+- WARN: something was refused since the last report, time went back, or the stream has not begun;
 - ERROR: everything since the last report was refused, or the stream has fallen silent.
 
 Counters go on from the start of the node, so that a reader may come late and still see all.
@@ -18,7 +18,8 @@ from dataclasses import dataclass, field
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from tablerunner.types import NANOSECONDS, Refusal
+from tablerunner.stream import RESTART_AFTER_S
+from tablerunner.types import NANOSECONDS, Refusal, nanoseconds
 from tablerunner_ros.clocks import steady_ns, steady_timer
 from tablerunner_ros.qos import qos_for
 
@@ -28,6 +29,9 @@ ERROR = DiagnosticStatus.ERROR
 
 PERIOD_S = 1.0
 """Time between reports, of the steady clock: also while simulated time stands."""
+
+RESTART_NS = nanoseconds(RESTART_AFTER_S)
+"""A stamp that is taken although it lies this far behind the last one began a stream anew."""
 
 LOG_EVERY_NS = 30 * NANOSECONDS
 """A refusal for the same reason is logged again after this long at the soonest."""
@@ -67,11 +71,15 @@ class _Stream:
         self.silence_ns = round(silence_s * NANOSECONDS)
         self.taken = 0
         self.refused = 0
+        self.expected = 0  # of those refused: by a gate, as happens to good data
+        self.restarts = 0
         self.reasons: Counter[str] = Counter()
         self.last_ns = 0  # steady time of the newest message that was taken
         self.stamp = 0
         self.reported_taken = 0
         self.reported_refused = 0
+        self.reported_expected = 0
+        self.reported_restarts = 0
 
 
 class Diagnostics:
@@ -99,7 +107,7 @@ class Diagnostics:
         steady_timer(node, PERIOD_S, self.publish)
 
     def watch(self, source: str, silence_s: float = 0.0) -> None:
-        """Report a stream from now on; silent for longer than `silence_s` is an error (0: never)."""
+        """Report a stream from now on; silence beyond `silence_s` is an error (0: never)."""
         self._streams[source] = _Stream(silence_s)
 
     def describe(self, extra: Callable[[Report], None]) -> None:
@@ -109,16 +117,25 @@ class Diagnostics:
     def take(self, source: str, stamp: int = 0) -> None:
         """Count a message that was used; `stamp` [ns] is that of the measurement."""
         stream = self._stream(source)
+        if stamp < stream.stamp - RESTART_NS:
+            stream.restarts += 1
+            self._node.get_logger().warning(f'{source}: time went back, started again')
         stream.taken += 1
         stream.last_ns = steady_ns()
         stream.stamp = stamp
 
-    def refuse(self, refusal: Refusal) -> None:
-        """Count a refusal by source, reason and key; log it now and then."""
+    def refuse(self, refusal: Refusal, *, expected: bool = False) -> None:
+        """Count a refusal by source, reason and key, and log it now and then.
+
+        One that is `expected` (an outlier at a gate) is neither logged nor a warning by itself.
+        """
         stream = self._stream(refusal.source)
         stream.refused += 1
+        stream.expected += expected
         reason = f'{refusal.reason} ({refusal.key})' if refusal.key else refusal.reason
         stream.reasons[reason] += 1
+        if expected:
+            return
         now = steady_ns()
         mark = (refusal.source, reason)
         if now - self._logged.get(mark, -LOG_EVERY_NS) >= LOG_EVERY_NS:
@@ -149,12 +166,17 @@ class Diagnostics:
         report = Report(f'{self._name}: {source}')
         taken = stream.taken - stream.reported_taken
         refused = stream.refused - stream.reported_refused
+        expected = stream.expected - stream.reported_expected
         stream.reported_taken, stream.reported_refused = stream.taken, stream.refused
+        stream.reported_expected = stream.expected
         elapsed_s = max((now - self._reported_ns) / NANOSECONDS, 1e-3)
         if refused:
             worst = stream.reasons.most_common(1)[0][0]
-            level = WARN if taken else ERROR
+            level = ERROR if not taken else WARN if refused > expected else OK
             report.add(level, f'{refused} of {taken + refused} refused, mostly: {worst}')
+        if stream.restarts > stream.reported_restarts:
+            stream.reported_restarts = stream.restarts
+            report.add(WARN, 'time went back: started again')
         if stream.silence_ns:
             quiet_ns = now - (stream.last_ns or self._started_ns)
             if quiet_ns > stream.silence_ns:
@@ -165,6 +187,7 @@ class Diagnostics:
             'taken': str(stream.taken),
             'refused': str(stream.refused),
             'rate [Hz]': f'{taken / elapsed_s:.1f}',
+            'restarts': str(stream.restarts),
             'last stamp [ns]': str(stream.stamp),
         }
         for reason, count in stream.reasons.items():

@@ -140,7 +140,7 @@ def warn_undeclared(node: Node) -> None:
 def _overrides(node: Node) -> dict[str, RosParameter]:
     # rclpy has no public way to list overrides that were not declared; test_parameters.py fails
     # should this attribute ever go.
-    return node._parameter_overrides
+    return node._parameter_overrides  # noqa: SLF001
 
 
 class _Group:

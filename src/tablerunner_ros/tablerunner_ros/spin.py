@@ -52,7 +52,7 @@ def spin_node(factory: Callable[[], Node], args: list[str] | None = None) -> int
         return DONE
     except (TablerunnerError, ParameterException) as error:
         return _bad_input(_first_line(error)) if node is None else _failed()
-    except Exception:
+    except Exception:  # noqa: BLE001 (the last frame of the process: shown in full)
         return _failed()
     finally:
         _end(node)

@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-from tablerunner_interfaces.msg import UwbExchange
-
+from tablerunner.messages.exchange import exchange_from_message
 from tablerunner.types import ExchangeSample
-from tablerunner_ros.conversions.stamp import fill_stamp, stamp_from_message
+from tablerunner_interfaces.msg import UwbExchange
+from tablerunner_ros.conversions.stamp import fill_stamp
 
-
-def exchange_from_message(message: UwbExchange) -> ExchangeSample:
-    """Return the exchange of a message."""
-    return ExchangeSample(
-        stamp=stamp_from_message(message.header.stamp),
-        anchor_id=message.anchor_id,
-        tag_id=message.tag_id,
-        sequence=message.sequence,
-        poll_tx=message.poll_tx,
-        poll_rx=message.poll_rx,
-        response_tx=message.response_tx,
-        response_rx=message.response_rx,
-        final_tx=message.final_tx,
-        final_rx=message.final_rx,
-        rx_power_dbm=message.rx_power,
-        first_path_power_dbm=message.first_path_power,
-    )
+__all__ = ['exchange_from_message', 'exchange_to_message']
 
 
 def exchange_to_message(sample: ExchangeSample, frame: str) -> UwbExchange:

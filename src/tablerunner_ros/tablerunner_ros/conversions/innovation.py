@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from array import array
 
-import numpy as np
-from tablerunner_interfaces.msg import Innovation as InnovationMessage
-
+from tablerunner.messages.innovation import innovation_from_message
 from tablerunner.types import Innovation
-from tablerunner_ros.conversions.stamp import fill_stamp, stamp_from_message
+from tablerunner_interfaces.msg import Innovation as InnovationMessage
+from tablerunner_ros.conversions.stamp import fill_stamp
+
+__all__ = ['innovation_from_message', 'innovation_to_message']
 
 
 def innovation_to_message(record: Innovation, frame: str, estimator: str) -> InnovationMessage:
@@ -27,21 +28,3 @@ def innovation_to_message(record: Innovation, frame: str, estimator: str) -> Inn
     message.accepted = record.accepted
     message.reason = record.reason
     return message
-
-
-def innovation_from_message(message: InnovationMessage) -> Innovation:
-    """Return the innovation of a message."""
-    size = len(message.innovation)
-    return Innovation(
-        stamp=stamp_from_message(message.header.stamp),
-        source=message.source,
-        key=message.key,
-        accepted=message.accepted,
-        reason=message.reason,
-        innovation=np.array(message.innovation, dtype=np.float64),
-        covariance=np.array(message.variance, dtype=np.float64).reshape(
-            (size, size) if len(message.variance) == size * size else (0, 0)
-        ),
-        nis=message.nis,
-        gate=message.gate,
-    )

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from builtin_interfaces.msg import Time
 
+from tablerunner.messages.stamp import stamp_from_message
 from tablerunner.types import NANOSECONDS
 
-
-def stamp_from_message(message: Time) -> int:
-    """Return a message's time as nanoseconds."""
-    return message.sec * NANOSECONDS + message.nanosec
+__all__ = ['fill_stamp', 'stamp_from_message', 'stamp_to_message']
 
 
 def stamp_to_message(stamp: int) -> Time:

@@ -6,33 +6,11 @@ import math
 
 from sensor_msgs.msg import JointState
 
-from tablerunner.types import Refusal, WheelSample
-from tablerunner_ros.conversions.stamp import fill_stamp, stamp_from_message
+from tablerunner.messages.wheels import wheels_from_message
+from tablerunner.types import WheelSample
+from tablerunner_ros.conversions.stamp import fill_stamp
 
-SOURCE = 'joint_states'
-
-
-def wheels_from_message(
-    message: JointState, left_joint: str, right_joint: str
-) -> WheelSample | Refusal:
-    """Return angles and speeds of both drive wheels, found by the names of their joints."""
-    stamp = stamp_from_message(message.header.stamp)
-    names = message.name
-    try:
-        left, right = names.index(left_joint), names.index(right_joint)
-    except ValueError:
-        missing = left_joint if left_joint not in names else right_joint
-        return Refusal(stamp, SOURCE, missing, 'joint is missing')
-    angles, speeds = message.position, message.velocity
-    if len(angles) != len(names):
-        return Refusal(stamp, SOURCE, '', 'names and positions differ in number')
-    if not (math.isfinite(angles[left]) and math.isfinite(angles[right])):
-        return Refusal(stamp, SOURCE, '', 'wheel angle is not finite')
-    if len(speeds) != len(names):
-        if speeds:
-            return Refusal(stamp, SOURCE, '', 'names and velocities differ in number')
-        return WheelSample(stamp, angles[left], angles[right])
-    return WheelSample(stamp, angles[left], angles[right], speeds[left], speeds[right])
+__all__ = ['wheels_from_message', 'wheels_to_message']
 
 
 def wheels_to_message(sample: WheelSample, left_joint: str, right_joint: str) -> JointState:

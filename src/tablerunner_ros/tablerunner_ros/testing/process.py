@@ -38,7 +38,7 @@ class Process:
     """A running program whose output is kept and which does not outlive its test."""
 
     def __init__(self, command: Sequence[str | Path], domain: int) -> None:
-        self._output = tempfile.TemporaryFile('w+', encoding='utf-8')
+        self._output = tempfile.TemporaryFile('w+', encoding='utf-8')  # noqa: SIM115 (closed with it)
         self.command = [str(part) for part in command]
         self._process = subprocess.Popen(
             self.command,

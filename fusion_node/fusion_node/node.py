@@ -1,0 +1,209 @@
+"""The node fusion_node: odometry, ranges and poses to the pose in the map and map to odom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+
+from fusion_node.output import EstimateOutput
+from tablerunner.config import Config, parameter
+from tablerunner.estimation import Localizer, LocalizerConfig, LocalizerState, Outcome
+from tablerunner.types import Refusal
+from tablerunner_interfaces.msg import Innovation as InnovationMessage
+from tablerunner_interfaces.msg import UwbAnchorArray, UwbRange
+from tablerunner_ros.conversions.anchors import anchors_from_message
+from tablerunner_ros.conversions.innovation import innovation_to_message
+from tablerunner_ros.conversions.odometry import odometry_from_message
+from tablerunner_ros.conversions.pose import pose_from_message
+from tablerunner_ros.conversions.uwb_range import range_from_message
+from tablerunner_ros.diagnostics import ERROR, OK, WARN, Diagnostics, Report
+from tablerunner_ros.parameters import declare_config
+from tablerunner_ros.qos import qos_for
+from tablerunner_ros.spin import spin_node
+from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
+
+ODOM, RANGES, ANCHORS, START = 'odom', 'uwb/ranges', 'uwb/anchors', 'initialpose'
+
+_LEVELS = {
+    LocalizerState.WAITING: WARN,
+    LocalizerState.ALIGNING: WARN,
+    LocalizerState.TRACKING: OK,
+    LocalizerState.LOST: ERROR,
+}
+
+
+@dataclass(frozen=True)
+class FusionNodeConfig(Config):
+    """Frames, which poses are used, and how soon silence is an error."""
+
+    map_frame: str = parameter('map', description='Frame of anchors and of the estimate')
+    odom_frame: str = parameter('odom', description='Frame of the odometry')
+    base_frame: str = parameter('base_link', description='Frame of the robot')
+    publish_tf: bool = parameter(
+        True, description='Whether the transform map to odom is published'
+    )
+    pose_sources: tuple[str, ...] = parameter(
+        ('camera/pose',),
+        description=(
+            'Topics of poses that are fused: camera/pose, uwb/pose. The fix of uwb/pose holds '
+            'nothing that uwb/ranges does not hold: use one of the two'
+        ),
+    )
+    use_ranges: bool = parameter(True, description='Whether uwb/ranges is fused')
+    silence: float = parameter(
+        1.0,
+        unit='s',
+        description='Silence of odometry or ranges after which diagnostics report it',
+        above=0.0,
+        high=60.0,
+    )
+
+
+class FusionNode(Node):
+    """Hands every measurement to the localiser and publishes what it then believes.
+
+    odometry/filtered leaves first, since the robot drives by it; the rest follows. Before the
+    start is known there is neither odometry/filtered nor map to odom, and pose carries the
+    variance of a heading that is not known.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('fusion_node', **options)
+        self._config = config = declare_config(self, FusionNodeConfig)
+        self._stamps = StampCheck(self, declare_config(self, StampConfig))
+        self._localizer = Localizer(
+            declare_config(self, LocalizerConfig, on_change=self._configure)
+        )
+        self._twist_covariance = np.zeros((2, 2))
+        self._output = EstimateOutput(
+            self, config.map_frame, config.odom_frame, config.base_frame, config.publish_tf
+        )
+        self._innovations = self.create_publisher(
+            InnovationMessage, 'innovations', qos_for('innovations')
+        )
+        self._diagnostics = Diagnostics(self)
+        self._diagnostics.watch(ODOM, config.silence)
+        self._diagnostics.describe(self._describe)
+        self._subscribe(Odometry, ODOM, self._on_odometry)
+        self._subscribe(UwbAnchorArray, ANCHORS, self._on_anchors)
+        self._subscribe(PoseWithCovarianceStamped, START, self._on_start)
+        if config.use_ranges:
+            self._diagnostics.watch(RANGES, config.silence)
+            self._subscribe(UwbRange, RANGES, self._on_range)
+        for topic in config.pose_sources:
+            self._subscribe(PoseWithCovarianceStamped, topic, partial(self._on_pose, topic))
+
+    def _subscribe(self, type_: type[Any], topic: str, callback: Callable[[Any], None]) -> None:
+        self.create_subscription(type_, topic, callback, qos_for(topic, subscriber=True))
+
+    def _on_odometry(self, message: Odometry) -> None:
+        config = self._config
+        sample = odometry_from_message(message, config.odom_frame, config.base_frame)
+        if self._refused(sample, ODOM):
+            return
+        outcome = self._localizer.add_odometry(sample)
+        self._twist_covariance = sample.twist_covariance
+        self._publish(outcome)
+        place = self._localizer.map_to_odom
+        if place is not None and outcome.estimate is not None:
+            self._output.transform(outcome.estimate.stamp, place)
+        self._count(outcome, ODOM, sample.stamp)
+
+    def _on_range(self, message: UwbRange) -> None:
+        sample = range_from_message(message)
+        if self._refused(sample, RANGES):
+            return
+        outcome = self._localizer.add_range(sample)
+        self._publish(outcome)
+        self._count(outcome, RANGES, sample.stamp)
+
+    def _on_pose(self, topic: str, message: PoseWithCovarianceStamped) -> None:
+        sample = pose_from_message(message, self._config.map_frame, topic)
+        if self._refused(sample, topic):
+            return
+        outcome = self._localizer.add_pose(sample)
+        self._publish(outcome)
+        self._count(outcome, topic, sample.stamp)
+
+    def _on_start(self, message: PoseWithCovarianceStamped) -> None:
+        sample = pose_from_message(message, self._config.map_frame, START)
+        if self._refused(sample, START):
+            return
+        outcome = self._localizer.set_pose(sample)
+        self._publish(outcome)
+        self._count(outcome, START, sample.stamp)
+        if not outcome.refusals:
+            self.get_logger().info('started anew at the pose given by initialpose')
+
+    def _on_anchors(self, message: UwbAnchorArray) -> None:
+        anchors = anchors_from_message(message, self._config.map_frame)
+        if isinstance(anchors, Refusal):
+            self._diagnostics.refuse(anchors)
+            return
+        self._localizer.set_anchors(anchors)
+        self._diagnostics.take(ANCHORS)
+
+    def _refused(self, sample: Any, source: str) -> bool:
+        """Count what was refused in converting it, or for a stamp ahead of the clock."""
+        if isinstance(sample, Refusal):
+            self._diagnostics.refuse(sample)
+            return True
+        if self._stamps.is_future(sample.stamp):
+            key = getattr(sample, 'anchor_id', '')
+            self._diagnostics.refuse(Refusal(sample.stamp, source, key, FUTURE))
+            return True
+        return False
+
+    def _publish(self, outcome: Outcome) -> None:
+        estimate = outcome.estimate
+        if estimate is None:
+            return
+        if self._localizer.estimate is not None:
+            self._output.odometry(estimate, self._localizer.velocity(), self._twist_covariance)
+        self._output.pose(estimate)
+
+    def _count(self, outcome: Outcome, source: str, stamp: int) -> None:
+        for innovation in outcome.innovations:
+            self._innovations.publish(
+                innovation_to_message(
+                    innovation, self._config.map_frame, self._localizer.config.estimator
+                )
+            )
+            if not innovation.accepted:
+                self._diagnostics.refuse(
+                    Refusal(stamp, source, innovation.key, innovation.reason), expected=True
+                )
+                return
+        for refusal in outcome.refusals:
+            self._diagnostics.refuse(refusal)
+        if not outcome.refusals:
+            self._diagnostics.take(source, stamp)
+
+    def _configure(self, config: LocalizerConfig) -> None:
+        self._localizer.configure(config)
+
+    def _describe(self, report: Report) -> None:
+        status = self._localizer.status
+        report.add(_LEVELS[status.state], status.words)
+        report.values['state'] = status.state.value
+        report.values['estimator'] = self._localizer.config.estimator
+        report.values['without measurement [s]'] = f'{status.dead_reckoning_s:.2f}'
+        estimate = self._localizer.estimate
+        if estimate is not None:
+            deviations = np.sqrt(np.maximum(estimate.covariance.diagonal(), 0.0))
+            for name, mean, deviation in zip(
+                self._localizer.state_names, estimate.mean, deviations, strict=False
+            ):
+                report.values[name] = f'{mean:.4f} +- {deviation:.4f}'
+
+
+def main() -> int:
+    """Run the node until it is told to end."""
+    return spin_node(FusionNode)

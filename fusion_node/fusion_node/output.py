@@ -1,0 +1,71 @@
+"""What fusion_node publishes of an estimate: odometry/filtered, pose, map to odom."""
+
+from __future__ import annotations
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+
+from tablerunner.geometry.pose import Pose2
+from tablerunner.types import Estimate, Matrix, OdometrySample
+from tablerunner_ros.conversions.odometry import fill_odometry
+from tablerunner_ros.conversions.pose import fill_pose_with_covariance
+from tablerunner_ros.qos import qos_for
+from tablerunner_ros.transforms import TransformBroadcaster
+
+
+class EstimateOutput:
+    """Publishers of the estimate; their messages are made once and filled each time.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    map_frame, odom_frame, base_frame : str
+    publish_tf : bool
+        Whether map to odom is broadcast.
+    """
+
+    def __init__(
+        self, node: Node, map_frame: str, odom_frame: str, base_frame: str, publish_tf: bool
+    ) -> None:
+        self._odometry = Odometry()
+        self._odometry.header.frame_id = map_frame
+        self._odometry.child_frame_id = base_frame
+        self._pose = PoseWithCovarianceStamped()
+        self._pose.header.frame_id = map_frame
+        self._odometry_publisher = node.create_publisher(
+            Odometry, 'odometry/filtered', qos_for('odometry/filtered')
+        )
+        self._pose_publisher = node.create_publisher(
+            PoseWithCovarianceStamped, 'pose', qos_for('pose')
+        )
+        self._tf = TransformBroadcaster(node, map_frame, odom_frame) if publish_tf else None
+
+    def odometry(
+        self, estimate: Estimate, velocity: tuple[float, float], twist_covariance: Matrix
+    ) -> None:
+        """Publish the estimate as odometry; `velocity` is forward [m/s] and turning [rad/s]."""
+        fill_odometry(
+            self._odometry,
+            OdometrySample(
+                estimate.stamp,
+                estimate.pose,
+                velocity[0],
+                velocity[1],
+                estimate.pose_covariance,
+                twist_covariance,
+            ),
+        )
+        self._odometry_publisher.publish(self._odometry)
+
+    def pose(self, estimate: Estimate) -> None:
+        """Publish the estimate as a pose with covariance, honest before the start is known."""
+        fill_pose_with_covariance(
+            self._pose, estimate.stamp, estimate.pose, estimate.pose_covariance
+        )
+        self._pose_publisher.publish(self._pose)
+
+    def transform(self, stamp: int, map_to_odom: Pose2) -> None:
+        """Broadcast where odom lies in map."""
+        if self._tf is not None:
+            self._tf.send(stamp, map_to_odom)

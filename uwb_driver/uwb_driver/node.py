@@ -1,0 +1,115 @@
+"""The node uwb_driver: exchanges of the radio to calibrated ranges and a UWB-only fix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.node import Node
+
+from tablerunner.config import Config, parameter
+from tablerunner.types import RangeSample, Refusal
+from tablerunner.uwb import Positioner, PositionerConfig, Ranger, RangerConfig
+from tablerunner_interfaces.msg import UwbAnchorArray, UwbExchange, UwbRange
+from tablerunner_ros.clocks import now_ns
+from tablerunner_ros.conversions.anchors import anchors_to_message
+from tablerunner_ros.conversions.exchange import exchange_from_message
+from tablerunner_ros.conversions.pose import pose_to_message
+from tablerunner_ros.conversions.uwb_range import range_to_message
+from tablerunner_ros.diagnostics import WARN, Diagnostics, Report
+from tablerunner_ros.parameters import declare_config
+from tablerunner_ros.qos import qos_for
+from tablerunner_ros.spin import spin_node
+from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
+
+EXCHANGES = 'uwb/exchanges'
+
+
+@dataclass(frozen=True)
+class UwbDriverConfig(Config):
+    """Frames of the node and how soon silence is an error."""
+
+    map_frame: str = parameter('map', description='Frame of the anchors and of the fix')
+    tag_frame: str = parameter('uwb_tag', description="Frame of the tag's antenna")
+    silence: float = parameter(
+        1.0,
+        unit='s',
+        description='Silence of an anchor, or of all, after which diagnostics report it',
+        above=0.0,
+        high=60.0,
+    )
+
+
+class UwbDriver(Node):
+    """Ranges each exchange, publishes the anchors, and solves for the tag's place.
+
+    The range leaves first; the fix and the counting come after it, since the estimate waits for
+    ranges only.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('uwb_driver', **options)
+        config = declare_config(self, UwbDriverConfig)
+        self._map_frame, self._tag_frame = config.map_frame, config.tag_frame
+        self._stamps = StampCheck(self, declare_config(self, StampConfig))
+        ranger = declare_config(self, RangerConfig, on_change=self._configure_ranger)
+        positioner = declare_config(self, PositionerConfig, on_change=self._configure_positioner)
+        self._ranger = Ranger(ranger)
+        self._positioner = Positioner(positioner, ranger.anchors)
+        self._last: dict[str, RangeSample] = {}
+
+        self._ranges = self.create_publisher(UwbRange, 'uwb/ranges', qos_for('uwb/ranges'))
+        self._fixes = self.create_publisher(
+            PoseWithCovarianceStamped, 'uwb/pose', qos_for('uwb/pose')
+        )
+        self._anchors = self.create_publisher(
+            UwbAnchorArray, 'uwb/anchors', qos_for('uwb/anchors')
+        )
+        self._diagnostics = Diagnostics(self)
+        self._diagnostics.watch(EXCHANGES, config.silence)
+        for anchor in ranger.anchors:
+            self._diagnostics.watch(f'{EXCHANGES}/{anchor.anchor_id}', config.silence)
+        self._diagnostics.describe(self._describe)
+        self._anchors.publish(anchors_to_message(ranger.anchors, now_ns(self), self._map_frame))
+        self.create_subscription(
+            UwbExchange, EXCHANGES, self._on_exchange, qos_for(EXCHANGES, subscriber=True)
+        )
+
+    def _on_exchange(self, message: UwbExchange) -> None:
+        sample = exchange_from_message(message)
+        if self._stamps.is_future(sample.stamp):
+            self._diagnostics.refuse(Refusal(sample.stamp, EXCHANGES, sample.anchor_id, FUTURE))
+            return
+        result = self._ranger.add(sample)
+        if isinstance(result, Refusal):
+            self._diagnostics.refuse(result)
+            return
+        self._ranges.publish(range_to_message(result, self._tag_frame))
+        self._diagnostics.take(EXCHANGES, result.stamp)
+        self._diagnostics.take(f'{EXCHANGES}/{result.anchor_id}', result.stamp)
+        self._last[result.anchor_id] = result
+        fix = self._positioner.add(result)
+        if isinstance(fix, Refusal):
+            self._diagnostics.refuse(fix)
+        elif fix is not None:
+            self._fixes.publish(pose_to_message(fix, self._map_frame))
+            self._diagnostics.take(fix.source, fix.stamp)
+
+    def _configure_ranger(self, config: RangerConfig) -> None:
+        self._ranger.configure(config)
+
+    def _configure_positioner(self, config: PositionerConfig) -> None:
+        self._positioner.config = config
+
+    def _describe(self, report: Report) -> None:
+        if not self._ranger.config.anchor_ids:
+            report.add(WARN, 'no anchors given: every exchange is refused (anchor_ids)')
+        for anchor_id, sample in self._last.items():
+            report.values[f'{anchor_id} range [m]'] = f'{sample.range_m:.3f}'
+            report.values[f'{anchor_id} NLOS probability'] = f'{sample.nlos_probability:.2f}'
+
+
+def main() -> int:
+    """Run the node until it is told to end."""
+    return spin_node(UwbDriver)
