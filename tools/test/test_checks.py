@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
 from bootstrap import checks
 from bootstrap.errors import SetupError
 

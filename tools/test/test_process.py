@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+
 from bootstrap import lock, process
 
 
@@ -44,8 +45,8 @@ def test_run_interrupted_ends_the_command_and_its_children(tmp_path: Path) -> No
             pids.append(int(line))
             raise KeyboardInterrupt
 
+    command = [sys.executable, '-S', '-c', code]
     with pytest.raises(KeyboardInterrupt):
-        command = [sys.executable, '-S', '-c', code]
         process.run(command, tmp_path / 'log', tmp_path, os.environ, on_line)
     deadline = time.monotonic() + 5
     while _is_running(pids[0]):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from bootstrap.environment import Environment, _entries, _locked_names
 from bootstrap.steps import outside_environment
 from bootstrap.workspace import Workspace
@@ -92,6 +93,9 @@ def test_outside_environment_forgets_this_checkout_only(tmp_path: Path) -> None:
 
 
 def test_entries_of_the_lock_keep_their_hashes() -> None:
-    text = '# head\na==1 \\\n    --hash=x \\\n    --hash=y\nb==2 ; python_version < "3" \\\n    --hash=z\n'
+    text = (
+        '# head\na==1 \\\n    --hash=x \\\n    --hash=y\n'
+        'b==2 ; python_version < "3" \\\n    --hash=z\n'
+    )
     assert _entries(text, ('b',)) == 'b==2 ; python_version < "3" \\\n    --hash=z\n'
     assert _locked_names(text) == ['a', 'b']
