@@ -58,7 +58,7 @@ class UwbErrors(Config):
     reply_delay: tuple[float, float] = parameter(
         (0.0008, 0.0012), description='least and most reply delay', unit='s', above=0.0, high=0.01
     )
-    power_std: float = parameter(0.8, description='noise of a power reading', unit='dB', low=0.0)
+    power_std: float = parameter(1.0, description='noise of a power reading', unit='dB', low=0.0)
 
     def check(self) -> None:
         """Refuse ranges that are upside down."""
@@ -172,7 +172,7 @@ class UltrasonicErrors(Config):
     )
     std: float = parameter(0.01, description='noise of an echo', unit='m', low=0.0)
     critical_incidence: float = parameter(
-        0.87,
+        0.7,
         description='angle to the normal beyond which a flat thing sends no echo back',
         unit='rad',
         above=0.0,
@@ -199,3 +199,38 @@ class SensorErrors(Config):
     imu: ImuErrors = parameter(factory=ImuErrors, description='gyroscope and accelerometers')
     magnetic: MagneticErrors = parameter(factory=MagneticErrors, description='magnetometer')
     ultrasonic: UltrasonicErrors = parameter(factory=UltrasonicErrors, description='ultrasonics')
+
+    def ideal(self) -> SensorErrors:
+        """Return the same rates and clocks without any error: for tests and for comparison."""
+        return SensorErrors(
+            uwb=self.uwb.replace(
+                range_std=0.0,
+                bias_std=0.0,
+                scale_std=0.0,
+                nlos_excess=(0.0, 0.0),
+                person_excess=(0.0, 0.0),
+                nlos_std=0.0,
+                loss_probability=0.0,
+                nlos_loss_probability=0.0,
+                power_std=0.0,
+            ),
+            wheels=self.wheels.replace(
+                ticks_per_turn=0,
+                radius_scale_std=0.0,
+                track_scale_std=0.0,
+                slip_rate=0.0,
+                floor_noise=0.0,
+            ),
+            imu=self.imu.replace(
+                gyro_std=0.0,
+                gyro_bias_std=0.0,
+                gyro_bias_walk=0.0,
+                gyro_scale_std=0.0,
+                acceleration_std=0.0,
+                acceleration_bias_std=0.0,
+            ),
+            magnetic=self.magnetic.replace(std=0.0, hard_iron_std=0.0),
+            ultrasonic=self.ultrasonic.replace(
+                std=0.0, missing_probability=0.0, false_probability=0.0
+            ),
+        )

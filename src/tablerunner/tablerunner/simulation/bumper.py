@@ -62,15 +62,12 @@ class Bumper:
         course = drive.pose.heading
         towards = -(away[nearest] @ [math.cos(course), math.sin(course)])
         closing = drive.linear_m_s * float(towards) / max(float(distances[nearest]), 1e-9)
-        speed = abs(drive.linear_m_s)
         if closing > 0.0:
             drive.block()
         if key in self._touching:
             return []
         self._touching.add(key)
-        return [
-            Contact(stamp, owner.kind, owner.name, True, max(closing, 0.0) or speed, drive.pose)
-        ]
+        return [Contact(stamp, owner.kind, owner.name, True, max(closing, 0.0), drive.pose)]
 
     def _people(
         self, stamp: int, drive: Drive, speed: float, people: Sequence[PersonState]

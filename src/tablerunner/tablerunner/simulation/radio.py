@@ -21,9 +21,10 @@ _SEND_GRID = 512  # delayed sending takes the nine lowest bits as zero
 _SEQUENCES = 1 << 32
 _POWER_AT_1M_DBM = -63.0  # -14.3 dBm sent, less 48.7 dB of free space at 6.5 GHz
 
-# How far the first path lies under the whole signal, and how much of the signal is lost [dB].
-# Below about 6 dB a line of sight is likely, above 10 dB it is not (the radios' makers' rule).
-_GAP_DB = {'': 3.0, 'person': 11.0, 'thing': 13.0}
+# How far the first path lies under the whole signal, for the least and the most detour, and how
+# much of the signal is lost [dB]. Less than about 6 dB tells of a line of sight, more than 10 dB
+# of none (the rule of the radios' maker); a thin obstacle lies between.
+_GAP_DB = {'': (3.0, 3.0), 'person': (7.5, 13.0), 'thing': (9.0, 17.0)}
 _LOSS_DB = {'': 0.0, 'person': 5.0, 'thing': 8.0}
 
 
@@ -103,9 +104,10 @@ class Radio:
     ) -> tuple[ExchangeSample | None, RangeTruth]:
         errors, random = self._errors, self._random[anchor.id]
         # Always the same draws, whatever happens, so that runs that differ in one thing compare.
-        normal = random.standard_normal(8)
+        normal = random.standard_normal(6)
         uniform = random.random(3)
-        excess = self._excess(stamp, anchor.id, blocked, float(normal[7]))
+        detour = self._next_detour(stamp, anchor.id, float(normal[5]))
+        excess = self._excess(blocked, detour)
         chance = errors.nlos_loss_probability if blocked else errors.loss_probability
         lost = bool(uniform[0] < chance)
         truth = RangeTruth(stamp, anchor.id, self._sequence, distance, blocked, excess, lost)
@@ -125,7 +127,8 @@ class Radio:
         times = _exchange_times(self._tag_clock, clock, flights, delays)
         power = _POWER_AT_1M_DBM - 20.0 * math.log10(max(distance, 0.1)) - _LOSS_DB[blocked]
         power += errors.power_std * float(normal[3])
-        gap = max(_GAP_DB[blocked] + errors.power_std * float(normal[4]), 0.0)
+        thin, thick = _GAP_DB[blocked]
+        gap = max(thin + (thick - thin) * detour + errors.power_std * float(normal[4]), 0.0)
         sample = ExchangeSample(
             stamp,
             anchor.id,
@@ -137,16 +140,20 @@ class Radio:
         )
         return sample, truth
 
-    def _excess(self, stamp: int, anchor_id: str, blocked: str, draw: float) -> float:
-        errors = self._errors
+    def _next_detour(self, stamp: int, anchor_id: str, draw: float) -> float:
+        """Return where between least (0) and most (1) the detour of the signal now lies."""
         last = self._detour_ns.get(anchor_id)
-        keep = 0.0 if last is None else math.exp(-seconds(stamp - last) / errors.nlos_hold)
+        keep = 0.0 if last is None else math.exp(-seconds(stamp - last) / self._errors.nlos_hold)
         self._detour[anchor_id] = keep * self._detour[anchor_id] + math.sqrt(1 - keep**2) * draw
         self._detour_ns[anchor_id] = stamp
+        return float(ndtr(self._detour[anchor_id]))
+
+    def _excess(self, blocked: str, detour: float) -> float:
         if not blocked:
             return 0.0
+        errors = self._errors
         low, high = errors.person_excess if blocked == 'person' else errors.nlos_excess
-        return low + (high - low) * float(ndtr(self._detour[anchor_id]))
+        return low + (high - low) * detour
 
 
 def _exchange_times(
