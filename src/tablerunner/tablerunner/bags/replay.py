@@ -1,0 +1,318 @@
+"""Replay of a bag through the code that the nodes run: same bag, same result, bit for bit."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tablerunner.bags.reader import BagReader
+from tablerunner.bags.replay_config import ReplayConfig
+from tablerunner.bags.storage import Damage
+from tablerunner.bags.streams import bag_records, converters, full_name
+from tablerunner.errors import BagError
+from tablerunner.estimation import Localizer, LocalizerState, Outcome
+from tablerunner.evaluation.consistency import SourceSummary, summarize_innovations
+from tablerunner.evaluation.errors import ErrorSeries, compare
+from tablerunner.evaluation.truth import Stamps, Truth
+from tablerunner.odometry import Odometer
+from tablerunner.types import (
+    Anchor,
+    Estimate,
+    ExchangeSample,
+    ImuSample,
+    Innovation,
+    Matrix,
+    OdometrySample,
+    PoseSample,
+    RangeSample,
+    Refusal,
+    WheelSample,
+    nanoseconds,
+    seconds,
+)
+from tablerunner.uwb import Positioner, Ranger
+
+FUTURE = 'stamp in the future'
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What the estimator believed over time; one row for each time it changed its mind.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (n,)
+        Times of the estimates [ns], in the order in which they came out.
+    poses : ndarray, shape (n, 3)
+        x, y [m], heading [rad] of base_link in map.
+    covariances : ndarray, shape (n, 3, 3)
+        Of the poses.
+    trusted : ndarray of bool, shape (n,)
+        Whether the estimator had declared itself initialised.
+    """
+
+    stamps: Stamps
+    poses: Matrix
+    covariances: Matrix
+    trusted: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+    def settled(self) -> Estimates:
+        """Return the trusted ones, of several for one time only the last."""
+        rows = np.flatnonzero(self.trusted)
+        stamps, first = np.unique(self.stamps[rows][::-1], return_index=True)
+        chosen = rows[::-1][first]
+        return Estimates(
+            stamps, self.poses[chosen], self.covariances[chosen], self.trusted[chosen]
+        )
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """What came out of a replay.
+
+    Attributes
+    ----------
+    estimator : str
+        Name of the estimator.
+    sources : tuple of str
+        Topics that were used.
+    anchors : tuple of Anchor
+        Anchors that were used.
+    estimates : Estimates
+        All that the estimator said.
+    state : LocalizerState
+        In which state it ended.
+    initialised : int or None
+        Stamp at which it first declared itself initialised [ns].
+    innovations : tuple of Innovation
+        What each measurement did.
+    refusals : dict of (source, reason) to int
+        Measurements that did not reach the estimator, and why.
+    truth : Truth
+        From ground_truth; empty when the bag has none.
+    errors : ErrorSeries
+        Of the settled estimates against the truth.
+    ranges : tuple of RangeSample
+        All ranges, calibrated.
+    fixes : tuple of PoseSample
+        UWB-only fixes; empty unless asked for.
+    start, end : int
+        Times of reception of the first and last message of the bag [ns].
+    damage : tuple of Damage
+        What of the bag could not be read.
+    """
+
+    estimator: str
+    sources: tuple[str, ...]
+    anchors: tuple[Anchor, ...]
+    estimates: Estimates
+    state: LocalizerState
+    initialised: int | None
+    innovations: tuple[Innovation, ...]
+    refusals: dict[tuple[str, str], int]
+    truth: Truth
+    errors: ErrorSeries
+    ranges: tuple[RangeSample, ...]
+    fixes: tuple[PoseSample, ...]
+    start: int
+    end: int
+    damage: tuple[Damage, ...] = ()
+
+    @property
+    def data_s(self) -> float:
+        """Length of the bag [s]."""
+        return seconds(self.end - self.start)
+
+    def by_source(self) -> dict[str, SourceSummary]:
+        """Return acceptance and NIS of each source."""
+        return summarize_innovations(self.innovations)
+
+
+def replay(bag: BagReader, config: ReplayConfig) -> ReplayResult:
+    """Run a bag through odometry, ranging and estimation.
+
+    Messages are taken in their order of reception, so that late ones are late here too. The
+    rawest topics present are used: joint_states and imu/data, else odom; uwb/exchanges, else
+    uwb/ranges. Anchors are those of `config`, else those of uwb/anchors. Poses of camera/pose and
+    initialpose are used as fusion_node does.
+
+    Parameters
+    ----------
+    bag : BagReader
+        The bag.
+    config : ReplayConfig
+        Settings of the nodes that are replayed.
+
+    Raises
+    ------
+    BagError
+        The bag holds no odometry, or no anchors are known.
+    """
+    run = _Replay(bag, config)
+    for topic, received, record in bag_records(
+        bag,
+        run.topics,
+        config.namespace,
+        converters(config.left_joint, config.right_joint, config.imu_heading),
+    ):
+        run.take(topic, received, record)
+    return run.result()
+
+
+@dataclass
+class _Log:
+    """What is gathered on the way; arrays are made once, at the end."""
+
+    stamps: list[int] = field(default_factory=list)
+    means: list[Matrix] = field(default_factory=list)
+    covariances: list[Matrix] = field(default_factory=list)
+    trusted: list[bool] = field(default_factory=list)
+    innovations: list[Innovation] = field(default_factory=list)
+    refusals: Counter[tuple[str, str]] = field(default_factory=Counter)
+    truth: list[OdometrySample] = field(default_factory=list)
+    ranges: list[RangeSample] = field(default_factory=list)
+    fixes: list[PoseSample] = field(default_factory=list)
+
+
+class _Replay:
+    """The three nodes in one process: odom_node, uwb_driver and fusion_node."""
+
+    def __init__(self, bag: BagReader, config: ReplayConfig) -> None:
+        self._bag, self._config = bag, config
+        self._tolerance = nanoseconds(config.stamp_tolerance)
+        self._log = _Log()
+        self.topics = self._choose()
+        self._own_anchors = bool(config.ranger.anchor_ids)
+        if not self._own_anchors:
+            self._take_bag_anchors()
+        anchors = self._config.ranger.anchors
+        self._odometer = Odometer(self._config.odometer)
+        self._ranger = Ranger(self._config.ranger)
+        self._positioner = Positioner(self._config.positioner, anchors)
+        self._localizer = Localizer(self._config.localizer)
+        self._localizer.set_anchors(anchors)
+        self._initialised: int | None = None
+
+    def _choose(self) -> tuple[str, ...]:
+        def present(topic: str) -> bool:
+            found = self._bag.topic(full_name(topic, self._config.namespace))
+            return found is not None and found.count > 0
+
+        wheels, ranges = 'joint_states', 'uwb/exchanges'
+        topics = [wheels, 'imu/data'] if present(wheels) else ['odom']
+        if not present(topics[0]):
+            place = f' in namespace {self._config.namespace}' if self._config.namespace else ''
+            raise BagError(
+                f'{self._bag.path} holds neither joint_states nor odom{place}: there is nothing '
+                'to replay'
+            )
+        topics.append(ranges if present(ranges) else 'uwb/ranges')
+        topics += ['camera/pose', 'initialpose', 'ground_truth']
+        return tuple(topic for topic in topics if present(topic))
+
+    def _take_bag_anchors(self) -> None:
+        """Use the anchors that the driver announced when the bag was recorded."""
+        for item in bag_records(self._bag, ['uwb/anchors'], self._config.namespace):
+            if isinstance(item.record, tuple) and item.record:
+                self._config = self._config.with_anchors(item.record)
+                return
+        if any(topic.startswith('uwb/') for topic in self.topics):
+            raise BagError(
+                f'{self._bag.path} does not say where the anchors are (no uwb/anchors): give a '
+                'scenario file'
+            )
+
+    def take(self, topic: str, received: int, record: object) -> None:
+        """Take one message as the node that subscribes to its topic would."""
+        log = self._log
+        if isinstance(record, Refusal):
+            log.refusals[record.source, record.reason] += 1
+            return
+        if isinstance(record, OdometrySample) and topic == 'ground_truth':
+            log.truth.append(record)
+            return
+        stamp: int = record.stamp  # type: ignore[attr-defined]
+        if stamp > received + self._tolerance:
+            log.refusals[topic, FUTURE] += 1
+        elif isinstance(record, WheelSample):
+            odometry = self._odometer.add_wheels(record)
+            if isinstance(odometry, Refusal):
+                log.refusals[odometry.source, odometry.reason] += 1
+            else:
+                self._note(self._localizer.add_odometry(odometry))
+        elif isinstance(record, ImuSample):
+            refusal = self._odometer.add_imu(record)
+            if refusal is not None:
+                log.refusals[refusal.source, refusal.reason] += 1
+        elif isinstance(record, ExchangeSample):
+            ranged = self._ranger.add(record)
+            if isinstance(ranged, Refusal):
+                log.refusals[ranged.source, ranged.reason] += 1
+            else:
+                self._take_range(ranged)
+        elif isinstance(record, RangeSample):
+            self._take_range(record)
+        elif isinstance(record, OdometrySample):
+            self._note(self._localizer.add_odometry(record))
+        elif isinstance(record, PoseSample):
+            if topic == 'initialpose':
+                self._note(self._localizer.set_pose(record))
+            else:
+                self._note(self._localizer.add_pose(record))
+
+    def _take_range(self, sample: RangeSample) -> None:
+        self._log.ranges.append(sample)
+        if self._config.fixes:
+            fix = self._positioner.add(sample)
+            if isinstance(fix, PoseSample):
+                self._log.fixes.append(fix)
+            elif isinstance(fix, Refusal):
+                self._log.refusals[fix.source, fix.reason] += 1
+        self._note(self._localizer.add_range(sample))
+
+    def _note(self, outcome: Outcome) -> None:
+        log = self._log
+        for refusal in outcome.refusals:
+            log.refusals[refusal.source, refusal.reason] += 1
+        log.innovations.extend(outcome.innovations)
+        estimate: Estimate | None = outcome.estimate
+        if estimate is None:
+            return
+        trusted = self._localizer.estimate is not None
+        if trusted and self._initialised is None:
+            self._initialised = estimate.stamp
+        log.stamps.append(estimate.stamp)
+        log.means.append(estimate.mean[:3])
+        log.covariances.append(estimate.covariance[:3, :3])
+        log.trusted.append(trusted)
+
+    def result(self) -> ReplayResult:
+        """Return what was gathered."""
+        log, count = self._log, len(self._log.stamps)
+        estimates = Estimates(
+            np.array(log.stamps, dtype=np.int64),
+            np.array(log.means).reshape(count, 3),
+            np.array(log.covariances).reshape(count, 3, 3),
+            np.array(log.trusted, dtype=bool),
+        )
+        truth = Truth.from_odometry(log.truth)
+        settled = estimates.settled()
+        return ReplayResult(
+            self._config.localizer.estimator,
+            self.topics,
+            self._config.ranger.anchors,
+            estimates,
+            self._localizer.status.state,
+            self._initialised,
+            tuple(log.innovations),
+            dict(sorted(log.refusals.items())),
+            truth,
+            compare(settled.stamps, settled.poses, truth, settled.covariances),
+            tuple(log.ranges),
+            tuple(log.fixes),
+            self._bag.start,
+            self._bag.end,
+            self._bag.damage,
+        )

@@ -1,0 +1,102 @@
+"""The topics of a bag as records of the core, in the order in which the nodes received them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from typing import Any, NamedTuple
+
+from tablerunner.bags.reader import BagReader
+from tablerunner.messages.anchors import anchors_from_message
+from tablerunner.messages.exchange import exchange_from_message
+from tablerunner.messages.imu import imu_from_message, magnetic_from_message
+from tablerunner.messages.innovation import innovation_from_message
+from tablerunner.messages.odometry import odometry_from_message
+from tablerunner.messages.pose import pose_from_message
+from tablerunner.messages.ultrasonic import ultrasonic_from_message
+from tablerunner.messages.uwb_range import range_from_message
+from tablerunner.messages.wheels import LEFT_JOINT, RIGHT_JOINT, wheels_from_message
+
+_DECODE_ERRORS = (AttributeError, TypeError, ValueError, IndexError)
+Converter = Callable[[Any], Any]
+
+
+class BagRecord(NamedTuple):
+    """One message as a record of the core, or the refusal of a message that is none."""
+
+    topic: str  # relative name as in the contract
+    received: int  # [ns] time of reception
+    record: Any  # record of tablerunner.types, tuple of Anchor, or Refusal
+
+
+def converters(
+    left_joint: str = LEFT_JOINT, right_joint: str = RIGHT_JOINT, imu_heading: float = 0.0
+) -> dict[str, Converter]:
+    """Return how the messages of each contract topic become records, by relative name.
+
+    Parameters
+    ----------
+    left_joint, right_joint : str
+        Joints of the drive wheels in joint_states.
+    imu_heading : float
+        Heading of the IMU's frame in base_link [rad].
+    """
+    table: dict[str, Converter] = {
+        'uwb/exchanges': exchange_from_message,
+        'uwb/ranges': range_from_message,
+        'uwb/anchors': anchors_from_message,
+        'joint_states': lambda message: wheels_from_message(message, left_joint, right_joint),
+        'imu/data': lambda message: imu_from_message(message, imu_heading),
+        'imu/mag': lambda message: magnetic_from_message(message, imu_heading),
+        'innovations': innovation_from_message,
+    }
+    for topic in ('odom', 'odometry/filtered', 'ground_truth'):
+        table[topic] = _odometry(topic)
+    for topic in ('uwb/pose', 'camera/pose', 'pose', 'initialpose'):
+        table[topic] = _pose(topic)
+    for name in ('left', 'left_front', 'front', 'right_front', 'right'):
+        table[f'ultrasonic/{name}'] = ultrasonic_from_message
+    return table
+
+
+def bag_records(
+    bag: BagReader,
+    topics: Collection[str],
+    namespace: str = '',
+    table: dict[str, Converter] | None = None,
+) -> Iterator[BagRecord]:
+    """Yield the records of some topics in the order of reception; other topics cost nothing.
+
+    Parameters
+    ----------
+    bag : BagReader
+        The bag; messages that lack a field are counted in its `damage`.
+    topics : collection of str
+        Relative names of the contract.
+    namespace : str
+        Namespace of the robot in the bag.
+    table : dict, optional
+        As returned by `converters`, which is used when not given.
+    """
+    table = converters() if table is None else table
+    wanted = {full_name(topic, namespace): (topic, table[topic]) for topic in topics}
+    for name, received, _, message in bag.messages(wanted):
+        topic, convert = wanted[name]
+        try:
+            record = convert(message)
+        except _DECODE_ERRORS as error:
+            bag.refuse(name, received, f'not as this program knows the type ({error})')
+            continue
+        yield BagRecord(topic, received, record)
+
+
+def full_name(topic: str, namespace: str = '') -> str:
+    """Return the full name of a relative topic in a namespace."""
+    return '/' + '/'.join(part for part in (namespace.strip('/'), topic.strip('/')) if part)
+
+
+def _odometry(topic: str) -> Converter:
+    return lambda message: odometry_from_message(message, source=topic)
+
+
+def _pose(topic: str) -> Converter:
+    return lambda message: pose_from_message(message, '', topic)

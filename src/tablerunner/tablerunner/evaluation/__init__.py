@@ -1,0 +1,1 @@
+"""How good an estimate is: errors against the truth, consistency, pictures."""
