@@ -30,9 +30,6 @@ ERROR = DiagnosticStatus.ERROR
 PERIOD_S = 1.0
 """Time between reports, of the steady clock: also while simulated time stands."""
 
-RESTART_NS = nanoseconds(RESTART_AFTER_S)
-"""A stamp that is taken although it lies this far behind the last one began a stream anew."""
-
 LOG_EVERY_NS = 30 * NANOSECONDS
 """A refusal for the same reason is logged again after this long at the soonest."""
 
@@ -91,11 +88,16 @@ class Diagnostics:
         Its name stands before each status.
     hardware_id : str
         What the values are about, e.g. the tag's name; may be empty.
+    restart_s : float
+        A stamp that is taken although it lies this far behind the last one began a stream anew.
     """
 
-    def __init__(self, node: Node, hardware_id: str = '') -> None:
+    def __init__(
+        self, node: Node, hardware_id: str = '', restart_s: float = RESTART_AFTER_S
+    ) -> None:
         self._node = node
         self._hardware_id = hardware_id
+        self._restart_ns = nanoseconds(restart_s)
         self._streams: dict[str, _Stream] = {}
         self._extras: list[Callable[[Report], None]] = []
         self._logged: dict[tuple[str, str], int] = {}
@@ -117,7 +119,7 @@ class Diagnostics:
     def take(self, source: str, stamp: int = 0) -> None:
         """Count a message that was used; `stamp` [ns] is that of the measurement."""
         stream = self._stream(source)
-        if stamp < stream.stamp - RESTART_NS:
+        if stamp < stream.stamp - self._restart_ns:
             stream.restarts += 1
             self._node.get_logger().warning(f'{source}: time went back, started again')
         stream.taken += 1

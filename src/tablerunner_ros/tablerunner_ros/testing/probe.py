@@ -43,6 +43,7 @@ class Probe:
         self._hosted: list[Node] = []
         self._publishers: dict[str, Publisher] = {}
         self._received: dict[str, list[Any]] = {}
+        self.listen(DiagnosticArray, 'diagnostics')
 
     def host(self, make: Callable[..., Node], **options: Any) -> Node:
         """Run a node under test in this process: `make(context=..., **options)`."""
