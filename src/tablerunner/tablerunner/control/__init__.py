@@ -6,7 +6,8 @@ from tablerunner.control.destination import Destination, MissionState, MissionSt
 from tablerunner.control.floor_map import Disc, FloorMap
 from tablerunner.control.follower import FollowerConfig, PurePursuit
 from tablerunner.control.limits import VelocityLimits
-from tablerunner.control.mission import Mission, MissionConfig
+from tablerunner.control.mission import Mission
+from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner, PlannerConfig
 from tablerunner.control.room import (
@@ -19,11 +20,11 @@ from tablerunner.control.room import (
 )
 from tablerunner.control.safety import (
     Localisation,
-    SafetyConfig,
     SafetyDecision,
     SafetyState,
     SafetyStop,
 )
+from tablerunner.control.safety_config import SafetyConfig
 
 CONTROLLERS = ('pure_pursuit',)  # names of the path controllers; 'fuzzy' joins later
 

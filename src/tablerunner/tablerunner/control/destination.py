@@ -19,6 +19,7 @@ class MissionState(str, Enum):
     PLANNING = 'planning'
     DRIVING = 'driving'
     BLOCKED = 'blocked'
+    HELD = 'held by the safety stop'
     WAITING = 'waiting'
     RETURNING = 'returning'
     DONE = 'done'
@@ -74,6 +75,8 @@ class Situation:
         Whether the safety stop holds the robot for something in its way.
     obstacle : tuple of float or None
         Where that is, in base_link [m].
+    held : bool
+        Whether the safety stop holds the robot for another reason: emergency stop, silence.
     """
 
     stamp: int
@@ -83,6 +86,7 @@ class Situation:
     heading_std_rad: float = math.inf
     blocked: bool = False
     obstacle: tuple[float, float] | None = None
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,6 +108,11 @@ class PurePursuit:
         self._at_end = False
         self._velocity = Velocity()
 
+    def configure(self, config: FollowerConfig, limits: VelocityLimits) -> None:
+        """Use other settings from now on."""
+        self.config = config
+        self.limits = limits
+
     def follow(self, path: Path) -> None:
         """Take a new path; the velocity carries on from the last one."""
         self._path = path

@@ -85,6 +85,12 @@ class Mission:
         """Whether a mission is under way."""
         return not self._state.is_final
 
+    def configure(self, config: MissionConfig, planner: Planner) -> None:
+        """Use other settings from now on; a mission under way goes on."""
+        self.config = config
+        self.planner = planner
+        self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
+
     def start(self, stops: tuple[Destination, ...], return_home: bool = False) -> None:
         """Take on a mission.
 
@@ -180,7 +186,11 @@ class Mission:
             self._events.append(f'{drive.cross_track:.1f} m off the path: planning anew')
             self._leg.path = None
             return None
-        if not self._watch(situation, pose, stop, drive, dt):
+        if situation.held:
+            # Not blocked: nobody can be waited for or driven around. The time limit goes on.
+            self._progress.restart()
+            self._state = MissionState.HELD
+        elif not self._watch(situation, pose, stop, drive, dt):
             return None
         return drive.velocity
 

@@ -88,6 +88,10 @@ class Planner:
     footprint_radius: float
     config: PlannerConfig = PlannerConfig()
 
+    def configured(self, config: PlannerConfig) -> Planner:
+        """Return a planner of the same floor with other settings (the grid stays)."""
+        return Planner(self.floor, self.footprint_radius, config)
+
     def check_goal(self, goal: Pose2) -> None:
         """Raise `PlanningError` in plain words if the robot cannot stand at `goal`."""
         if not goal.is_finite:

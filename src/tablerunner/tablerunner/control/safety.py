@@ -100,6 +100,12 @@ class SafetyStop:
         self._reversed_m = 0.0
         self._emergency: str | None = None
 
+    def configure(self, config: SafetyConfig, limits: VelocityLimits) -> None:
+        """Use other settings from now on; what was heard stays."""
+        self.config = config
+        self.limits = limits
+        self._echoes.hold_s = config.hold_time
+
     def add_reading(self, sample: UltrasonicSample, now: int) -> Refusal | None:
         """Take an ultrasonic reading; a refused one counts as silence."""
         return self._echoes.add(sample, now)
@@ -132,6 +138,7 @@ class SafetyStop:
         command_stamp: int,
         localisation: Localisation,
         motion: Velocity | None = None,
+        fault: str = '',
     ) -> SafetyDecision:
         """Return the decision of this instant.
 
@@ -146,6 +153,8 @@ class SafetyStop:
         localisation : Localisation
         motion : Velocity or None
             How the robot moves, measured; None: as was last decided.
+        fault : str
+            A reason to stand still that only the caller can see, e.g. a clock that stands.
         """
         dt = seconds(now - self._now) if self._now else 0.0
         self._now = now
@@ -156,6 +165,8 @@ class SafetyStop:
         elif self._last.linear_m_s > 0:
             self._reversed_m = 0.0
         reasons = self._halts(now, command, command_stamp, localisation)
+        if fault:
+            reasons.insert(0, fault)
         if reasons or command is None:
             self._last = Velocity()
             self._stopped, self._clear_since = True, None

@@ -1,0 +1,106 @@
+"""The deliver action without a blocking or waiting callback.
+
+A goal is taken up when it is accepted, runs in the node's control timer and is finished from
+there: a coroutine that awaits the end would keep rclpy's executor spinning at full load (it looks
+at unfinished tasks again and again), a blocking one would hold up everything else.
+
+A goal that cannot be used is accepted and aborted at once: a rejection could not carry the reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.node import Node
+
+from nav_controller.convert import names_of_goal, result_from_status
+from tablerunner.control import MissionStatus
+from tablerunner_interfaces.action import Deliver
+
+
+class _DeferringServer(ActionServer):
+    """An action server that does nothing by itself once a goal is executing."""
+
+    def notify_execute(
+        self, goal_handle: ServerGoalHandle, execute_callback: Callable[..., Any] | None
+    ) -> None:
+        """Run what is given; what was registered stands only for the constructor's sake."""
+        if execute_callback is not None:
+            super().notify_execute(goal_handle, execute_callback)
+
+
+class DeliverServer:
+    """Serves `deliver` on behalf of a node.
+
+    Parameters
+    ----------
+    node : Node
+    begin : callable
+        Takes a goal up; returns the reason why it cannot be, or ''.
+    cancel : callable
+        Ends what was begun; `finish` is expected to follow.
+    """
+
+    def __init__(
+        self, node: Node, begin: Callable[[Deliver.Goal], str], cancel: Callable[[], None]
+    ) -> None:
+        self._begin = begin
+        self._cancel = cancel
+        self._goal: ServerGoalHandle | None = None
+        self._server = _DeferringServer(
+            node,
+            Deliver,
+            'deliver',
+            execute_callback=lambda _goal: Deliver.Result(),
+            handle_accepted_callback=self._on_accepted,
+            cancel_callback=self._on_cancel,
+        )
+
+    @property
+    def is_active(self) -> bool:
+        """Whether a goal is under way."""
+        return self._goal is not None
+
+    def feedback(self, message: Deliver.Feedback) -> None:
+        """Publish feedback of the goal under way."""
+        if self._goal is not None:
+            self._goal.publish_feedback(message)
+
+    def finish(self, status: MissionStatus) -> None:
+        """End the goal under way with the outcome of its mission."""
+        goal, self._goal = self._goal, None
+        if goal is not None:
+            self._end(goal, result_from_status(status))
+
+    def _on_accepted(self, goal: ServerGoalHandle) -> None:
+        reason = self._begin(goal.request)
+        goal.execute()
+        if not reason:
+            self._goal = goal
+            return
+        names = names_of_goal(goal.request)
+        refused = Deliver.Result(
+            success=False, missed=names, reasons=[reason] * len(names), message=reason
+        )
+        self._end(goal, refused)
+
+    def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
+        if self._goal is None or goal.goal_id != self._goal.goal_id:
+            return CancelResponse.REJECT
+        self._cancel()
+        return CancelResponse.ACCEPT
+
+    def _end(self, goal: ServerGoalHandle, result: Deliver.Result) -> None:
+        def end(handle: ServerGoalHandle) -> Deliver.Result:
+            if handle.is_cancel_requested:
+                handle.canceled()
+            elif result.success:
+                handle.succeed()
+            else:
+                handle.abort()
+            return result
+
+        self._server.notify_execute(goal, end)

@@ -1,0 +1,121 @@
+"""Parameters of both nodes that are not the core's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tablerunner.config import Config, parameter
+from tablerunner.control import (
+    CONTROLLERS,
+    FollowerConfig,
+    MissionConfig,
+    PlannerConfig,
+    SafetyConfig,
+    VelocityLimits,
+)
+from tablerunner.errors import ConfigError
+from tablerunner.geometry.pose import Pose2
+
+_FRAMES = (
+    'ultrasonic_left',
+    'ultrasonic_left_front',
+    'ultrasonic_front',
+    'ultrasonic_right_front',
+    'ultrasonic_right',
+)
+
+
+@dataclass(frozen=True)
+class NavNodeConfig(Config):
+    """Everything about nav_controller."""
+
+    scenario: str = parameter(description='Scenario file: walls, tables, robot')
+    map_frame: str = parameter('map', description='Frame of goals and poses')
+    base_frame: str = parameter('base_link', description='Frame of the robot')
+    control_rate: float = parameter(
+        20.0, description='Velocities per second', unit='Hz', low=5.0, high=100.0
+    )
+    feedback_rate: float = parameter(
+        5.0, description='Feedback messages per second', unit='Hz', low=0.5, high=100.0
+    )
+    twist_stamped: bool = parameter(
+        False, description='Whether cmd_vel_nav is TwistStamped instead of Twist'
+    )
+    controller: str = parameter(
+        'pure_pursuit', description='What follows the planned paths', choices=CONTROLLERS
+    )
+    limits: VelocityLimits = parameter(
+        factory=VelocityLimits, description='Velocity limits, within those of the base'
+    )
+    follower: FollowerConfig = parameter(
+        factory=FollowerConfig, description='How paths are followed'
+    )
+    planner: PlannerConfig = parameter(factory=PlannerConfig, description='What a good way is')
+    mission: MissionConfig = parameter(
+        factory=MissionConfig, description='How patient a mission is'
+    )
+
+
+@dataclass(frozen=True)
+class SafetyNodeConfig(Config):
+    """Everything about safety_stop."""
+
+    scenario: str = parameter(
+        '',
+        description='Scenario file to take sensors, footprint and base limits from; may be empty',
+    )
+    ultrasonic_frames: tuple[str, ...] = parameter(
+        _FRAMES, description='Frames of the ultrasonic sensors; all must be heard'
+    )
+    ultrasonic_poses: tuple[float, ...] = parameter(
+        (
+            *(0.0, 0.22, 1.5708),
+            *(0.1685, 0.1414, 0.6981),
+            *(0.22, 0.0, 0.0),
+            *(0.1685, -0.1414, -0.6981),
+            *(0.0, -0.22, -1.5708),
+        ),
+        description='x, y [m], heading [rad] of each sensor in base_link, one after the other',
+    )
+    map_frame: str = parameter('map', description='Frame of the pose')
+    base_frame: str = parameter('base_link', description='Frame of the robot')
+    watch_rate: float = parameter(
+        20.0, description='Checks per second when no command comes', unit='Hz', low=5.0, high=100.0
+    )
+    clock_timeout: float = parameter(
+        0.5,
+        description='Stop when the node clock stands still for longer (wall time)',
+        unit='s',
+        above=0.0,
+        high=5.0,
+    )
+    twist_stamped: bool = parameter(
+        False, description='Whether cmd_vel_nav and cmd_vel are TwistStamped instead of Twist'
+    )
+    limits: VelocityLimits = parameter(
+        factory=VelocityLimits, description='Velocity limits, within those of the base'
+    )
+    safety: SafetyConfig = parameter(
+        factory=SafetyConfig, description='When to slow down and to stop'
+    )
+
+    def check(self) -> None:
+        """Want one pose for each sensor, and each sensor once."""
+        wanted = 3 * len(self.ultrasonic_frames)
+        if len(self.ultrasonic_poses) != wanted:
+            raise ConfigError(
+                'ultrasonic_poses',
+                list(self.ultrasonic_poses),
+                f'{wanted} numbers: x, y, heading for each of ultrasonic_frames',
+            )
+        if len(set(self.ultrasonic_frames)) != len(self.ultrasonic_frames):
+            raise ConfigError('ultrasonic_frames', list(self.ultrasonic_frames), 'each frame once')
+
+    @property
+    def mounts(self) -> dict[str, Pose2]:
+        """Pose of each sensor in base_link by frame."""
+        numbers = iter(self.ultrasonic_poses)
+        return {
+            frame: Pose2(*next(zip(numbers, numbers, numbers, strict=False)))
+            for frame in self.ultrasonic_frames
+        }
