@@ -1,0 +1,142 @@
+"""Scenarios that cannot be are refused with file, line, field and value."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tablerunner.errors import ConfigError
+from tablerunner.scenario import load_scenario
+
+GOOD = """\
+name: cafe
+walls:
+  - name: hull
+    closed: true
+    points: [[0, 0], [10, 0], [10, 10], [0, 10]]
+  - points: [[6, 0], [6, 3]]
+tables:
+  - {name: table_1, x: 3.0, y: 3.0, stop: [4.2, 3.0, 0.0]}
+  - {name: table_2, x: 3.0, y: 7.0, stop: [4.2, 7.0, 0.0]}
+boxes:
+  - {name: stove, x: 9.0, y: 9.0, length: 1.0, width: 1.0}
+kitchen:
+  stop: [8.0, 6.0, 0.0]
+anchors:
+  - {id: A0, position: [0.1, 0.1, 2.25]}
+  - {id: A1, position: [9.9, 0.1, 2.25]}
+people:
+  - name: waiter
+    route: [[5.0, 1.0], [5.0, 9.0]]
+routes:
+  tour: [[5.0, 5.0], [8.0, 5.0]]
+robot:
+  wheel_radius: 0.06
+sensors:
+  uwb: {range_std: 0.1}
+"""
+
+
+def load_text(folder: Path, text: str) -> None:
+    path = folder / 'cafe.yaml'
+    path.write_text(text, encoding='utf-8')
+    load_scenario(path)
+
+
+def test_rules_accept_the_scenario_that_the_others_spoil(tmp_path: Path) -> None:
+    load_text(tmp_path, GOOD)
+
+
+CASES = {
+    # what: (good line, bad line, field, part of the message)
+    'wrong type': ('x: 3.0, y: 3.0', 'x: three, y: 3.0', 'tables[0].x', 'a finite number'),
+    'NaN': ('x: 3.0, y: 3.0', 'x: .nan, y: 3.0', 'tables[0].x', 'got nan'),
+    'infinite height': ('9.9, 0.1, 2.25', '9.9, 0.1, .inf', 'anchors[1].position[2]', 'got inf'),
+    'missing field': ('name: table_2, ', '', 'tables[1].name', "got 'nothing'"),
+    'slip of a name': (
+        'range_std',
+        'range_sdt',
+        'sensors.uwb.range_sdt',
+        'did you mean range_std',
+    ),
+    'negative noise': ('range_std: 0.1', 'range_std: -0.1', 'sensors.uwb.range_std', 'at least 0'),
+    'zero radius': ('wheel_radius: 0.06', 'wheel_radius: 0', 'robot.wheel_radius', 'above 0'),
+    'wide track': ('wheel_radius: 0.06', 'track: 0.6', 'robot.track', 'twice footprint'),
+    'duplicate anchor': ('id: A1', 'id: A0', 'anchors[1].id', 'each id once'),
+    'anchors in one place': (
+        '9.9, 0.1, 2.25',
+        '0.1, 0.1, 2.25',
+        'anchors[1].position',
+        'another place than anchor A0',
+    ),
+    'duplicate table': ('table_2', 'table_1', 'tables[1].name', 'each name once'),
+    'table called kitchen': ('table_2', 'kitchen', 'tables[1].name', 'than the kitchen'),
+    'wall of zero length': (
+        '[[6, 0], [6, 3]]',
+        '[[6, 0], [6, 0]]',
+        'walls[1].points[1]',
+        'apart from the one before',
+    ),
+    'wall of one point': ('[[6, 0], [6, 3]]', '[[6, 0]]', 'walls[1].points', 'at least two'),
+    'closing edge of zero length': (
+        '[[0, 0], [10, 0], [10, 10], [0, 10]]',
+        '[[0, 0], [10, 0], [10, 10], [0, 0]]',
+        'walls[0].points[0]',
+        'apart from',
+    ),
+    'table in a wall': ('x: 3.0, y: 3.0', 'x: 6.2, y: 2.0', 'tables[0]', 'clear of the wall'),
+    'table outside': ('x: 3.0, y: 3.0', 'x: 13.0, y: 3.0', 'tables[0]', 'inside the outer walls'),
+    'tables in each other': ('x: 3.0, y: 7.0', 'x: 3.3, y: 3.2', 'tables[1]', 'clear of table_1'),
+    'table swallows box': ('x: 9.0, y: 9.0', 'x: 3.0, y: 7.0', 'boxes[0]', 'clear of table_2'),
+    'stop in a table': ('[4.2, 3.0, 0.0]', '[3.0, 3.0, 0.0]', 'tables[0].stop', 'of table_1'),
+    'stop too near': ('[4.2, 3.0, 0.0]', '[3.8, 3.0, 0.0]', 'tables[0].stop', 'at least 0.25 m'),
+    'stop outside': ('[4.2, 3.0, 0.0]', '[14, 3.0, 0.0]', 'tables[0].stop', 'inside the outer'),
+    'kitchen in a wall': ('[8.0, 6.0, 0.0]', '[6.1, 2.0, 0]', 'kitchen.stop', 'clear of wall'),
+    'pose of two numbers': ('[8.0, 6.0, 0.0]', '[8.0, 6.0]', 'kitchen.stop', '3 values'),
+    'person walks through table': (
+        '[[5.0, 1.0], [5.0, 9.0]]',
+        '[[3.0, 1.0], [3.0, 5.0]]',
+        'people[0].route[1]',
+        'clear of table_1',
+    ),
+    'person without a way': ('[[5.0, 1.0], [5.0, 9.0]]', '[]', 'people[0].route', 'one point'),
+    'route into a wall': ('[8.0, 5.0]]', '[9.9, 5.0]]', 'routes.tour[1]', 'clear of hull'),
+    'route of one point': (', [8.0, 5.0]]', ']', 'routes.tour', 'at least two'),
+    'key twice': ('  wheel_radius: 0.06', '  track: 0.3\n  track: 0.3', 'robot.track', 'once'),
+}
+
+
+@pytest.mark.parametrize('what', CASES)
+def test_rules_refuse_naming_file_line_and_field(tmp_path: Path, what: str) -> None:
+    """Each spoilt line is named by file and number, and the field in it by its path."""
+    good, bad, field, words = CASES[what]
+    assert GOOD.count(good) == 1
+    text = GOOD.replace(good, bad)
+    line = GOOD[: GOOD.index(good)].count('\n') + 1 + bad.count('\n')
+    with pytest.raises(ConfigError) as caught:
+        load_text(tmp_path, text)
+    error = caught.value
+    assert error.field == field
+    assert error.line == line
+    assert str(error).startswith(f'{tmp_path / "cafe.yaml"}:{line}: {field}: got ')
+    assert words in str(error)
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('name: [', 'expected YAML'),
+        ('- a\n- b\n', 'a mapping of fields'),
+        ('walls: []\n', 'name: got .nothing.'),
+        ('name: cafe\nstart: [1, 2, north]\n', r':2: start\[2\]: got .north.'),
+    ],
+)
+def test_rules_refuse_a_file_that_is_no_scenario(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        load_text(tmp_path, text)
+
+
+def test_rules_refuse_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r'nowhere\.yaml.*a readable file'):
+        load_scenario(tmp_path / 'nowhere.yaml')
