@@ -144,7 +144,8 @@ class NavNode(Node):
     def _on_timer(self) -> None:
         stamp = now_ns(self)
         situation = self._situation(stamp)
-        velocity, self._status = status = self._mission.step(situation)
+        velocity, status = self._mission.step(situation)
+        self._status = status
         self._send(velocity, stamp)
         for event in status.events:
             self.get_logger().info(event)
