@@ -56,15 +56,11 @@ class Localizer:
     def __init__(self, config: LocalizerConfig, anchors: tuple[Anchor, ...] = ()) -> None:
         self.config = config
         self._anchors: tuple[Anchor, ...] = ()
-        self._pending: PoseSample | None = None
         self._clear()
         self.set_anchors(anchors)
-        if config.initial_pose:
-            x, y, heading = config.initial_pose
-            covariance = np.diag(np.square(config.initial_pose_std))
-            self._pending = PoseSample(0, Pose2(x, y, heading), covariance, 'initial_pose')
 
     def _clear(self) -> None:
+        self._pending = _initial_pose(self.config)
         self._track = OdometryTrack()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
@@ -103,7 +99,7 @@ class Localizer:
             self._begin(Start(newest.stamp, newest.mean[:3], newest.pose_covariance))
 
     def reset(self) -> None:
-        """Forget everything but anchors and settings."""
+        """Forget everything but anchors and settings; begin as at the start."""
         self._clear()
 
     def _new_estimator(self) -> Estimator:
@@ -305,6 +301,14 @@ class Localizer:
             self._timeline = None
             self._lost = True
             self._forget_start()
+
+
+def _initial_pose(config: LocalizerConfig) -> PoseSample | None:
+    if not config.initial_pose:
+        return None
+    x, y, heading = config.initial_pose
+    covariance = np.diag(np.square(config.initial_pose_std))
+    return PoseSample(0, Pose2(x, y, heading), covariance, INITIAL_POSE_SOURCE)
 
 
 def _vector(pose: Pose2) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

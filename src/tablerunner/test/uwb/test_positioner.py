@@ -1,0 +1,86 @@
+"""The positioner closes an epoch when all have answered, one answers again, or time is up."""
+
+import numpy as np
+import pytest
+
+from tablerunner.types import Anchor, PoseSample, RangeSample, Refusal
+from tablerunner.uwb import Positioner, PositionerConfig
+
+ANCHORS = tuple(
+    Anchor(f'A{i}', position)
+    for i, position in enumerate(
+        [(0.0, 0.0, 2.0), (10.0, 0.0, 2.0), (10.0, 10.0, 2.0), (0.0, 10.0, 2.0)]
+    )
+)
+PLACE = np.array([3.0, 4.0, 1.1])
+START = 1_000_000_000
+
+
+def ranged(index, stamp_ms, extra=0.0, probability=0.0):
+    distance = float(np.linalg.norm(PLACE - ANCHORS[index].position)) + extra
+    return RangeSample(
+        START + stamp_ms * 1_000_000,
+        f'A{index}',
+        'tag',
+        0,
+        distance,
+        0.01,
+        nlos_probability=probability,
+    )
+
+
+def positioner():
+    return Positioner(PositionerConfig(), ANCHORS)
+
+
+def test_add_every_anchor_gives_a_fix_at_the_mean_stamp():
+    """The fourth answer completes the epoch; the fix knows no heading."""
+    gatherer = positioner()
+    results = [gatherer.add(ranged(i, 20 * i)) for i in range(4)]
+    assert results[:3] == [None, None, None]
+    fix = results[3]
+    assert isinstance(fix, PoseSample)
+    assert (fix.pose.x, fix.pose.y) == pytest.approx((3.0, 4.0), abs=1e-6)
+    assert fix.stamp == START + 30_000_000
+    assert np.isinf(fix.covariance[2, 2])
+
+
+def test_add_same_anchor_again_closes_the_epoch_before_it():
+    """With one anchor silent, three ranges make the fix once the first anchor comes round."""
+    gatherer = positioner()
+    results = [gatherer.add(ranged(i, 20 * k)) for k, i in enumerate((0, 1, 2, 0))]
+    assert results[:3] == [None, None, None]
+    assert isinstance(results[3], PoseSample)
+
+
+def test_add_after_a_pause_refuses_the_thin_epoch():
+    """Two ranges and then silence are no fix, and said to be none."""
+    gatherer = positioner()
+    gatherer.add(ranged(0, 0))
+    gatherer.add(ranged(1, 20))
+    result = gatherer.add(ranged(2, 500))
+    assert isinstance(result, Refusal)
+    assert result.reason == 'fewer than three ranges in an epoch'
+
+
+def test_add_nlos_range_widens_the_covariance_and_counts_less():
+    """A range marked NLOS pulls the fix less than the same range unmarked."""
+
+    def fix_with(probability):
+        gatherer = positioner()
+        fix = None
+        for i in range(4):
+            late = (0.8, probability) if i == 0 else (0.0, 0.0)
+            fix = gatherer.add(ranged(i, 20 * i, *late))
+        assert isinstance(fix, PoseSample)
+        return np.hypot(fix.pose.x - 3.0, fix.pose.y - 4.0)
+
+    assert fix_with(1.0) < 0.5 * fix_with(0.0)
+
+
+def test_add_unknown_anchor_is_refused():
+    """A range of an anchor that nobody described is refused by name."""
+    stranger = RangeSample(START, 'B7', 'tag', 0, 3.0)
+    result = positioner().add(stranger)
+    assert isinstance(result, Refusal)
+    assert (result.key, result.reason) == ('B7', 'unknown anchor')

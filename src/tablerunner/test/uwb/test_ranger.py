@@ -1,0 +1,107 @@
+"""The ranger turns exchanges into ranges and says why it refuses one."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from tablerunner.errors import ConfigError
+from tablerunner.types import ExchangeSample, LosState, RangeSample, Refusal
+from tablerunner.uwb import Ranger, RangerConfig
+
+CONFIG = RangerConfig(anchor_ids=('A0', 'A1'), anchor_positions=(0.0, 0.0, 2.0, 5.0, 0.0, 2.0))
+TICKS_PER_M = 128 * 499.2e6 / 299_702_547.0
+SECOND = 1_000_000_000
+
+
+def sample(stamp=SECOND, sequence=1, anchor='A0', distance=5.0, gap=3.0):
+    flight, reply = round(distance * TICKS_PER_M), 60_000_000
+    return ExchangeSample(
+        stamp,
+        anchor,
+        'tag',
+        sequence,
+        0,
+        flight,
+        flight + reply,
+        2 * flight + reply,
+        2 * flight + 2 * reply,
+        3 * flight + 2 * reply,
+        -80.0,
+        -80.0 - gap,
+    )
+
+
+def reason(result):
+    assert isinstance(result, Refusal)
+    assert (result.source, result.key) == ('uwb/exchanges', result.key)
+    return result.reason
+
+
+def test_add_good_exchange_gives_calibrated_range():
+    """The range is calibrated, the raw one kept, the noise the configured one."""
+    ranger = Ranger(CONFIG.replace(anchor_biases=(0.3, 0.0), anchor_scales=(0.02, 0.0)))
+    result = ranger.add(sample(distance=5.4))
+    assert isinstance(result, RangeSample)
+    assert result.raw_range_m == pytest.approx(5.4, abs=0.01)
+    assert result.range_m == pytest.approx((5.4 - 0.3) / 1.02, abs=0.01)
+    assert result.variance_m2 == pytest.approx(CONFIG.range_std**2)
+
+
+def test_add_weak_first_path_is_marked_nlos():
+    """The power gap decides between LOS, NLOS and unknown."""
+    ranger = Ranger(CONFIG)
+    clear = ranger.add(sample(sequence=1))
+    blocked = ranger.add(sample(stamp=2 * SECOND, sequence=2, gap=15.0))
+    silent = ranger.add(
+        replace(sample(stamp=3 * SECOND, sequence=3), rx_power_dbm=math.nan)
+    )
+    assert [item.los for item in (clear, blocked, silent)] == [
+        LosState.LOS,
+        LosState.NLOS,
+        LosState.UNKNOWN,
+    ]
+
+
+@pytest.mark.parametrize(
+    ('bad', 'words'),
+    [
+        (sample(stamp=0, sequence=9), 'zero stamp'),
+        (sample(stamp=2 * SECOND, sequence=1), 'repeated sequence number'),
+        (sample(stamp=SECOND, sequence=2), 'stamp does not advance'),
+        (sample(stamp=2 * SECOND, sequence=2, anchor='A9'), 'unknown anchor'),
+        (sample(stamp=2 * SECOND, sequence=2, distance=-3.0), 'negative range'),
+        (sample(stamp=2 * SECOND, sequence=2, distance=80.0), 'range beyond max_range'),
+        (replace(sample(2 * SECOND, 2), final_tx=5), 'impossible exchange times'),
+    ],
+)
+def test_add_bad_exchange_is_refused_with_reason(bad, words):
+    """Each fault has its own words, and the next good exchange is taken."""
+    ranger = Ranger(CONFIG)
+    assert isinstance(ranger.add(sample()), RangeSample)
+    assert reason(ranger.add(bad)) == words
+    assert isinstance(ranger.add(sample(stamp=3 * SECOND, sequence=3)), RangeSample)
+
+
+def test_add_stream_started_again_is_taken_up():
+    """After a restart from an earlier time, ranging goes on from the third exchange."""
+    ranger = Ranger(CONFIG)
+    ranger.add(sample(stamp=100 * SECOND, sequence=500))
+    results = [ranger.add(sample(stamp=k * SECOND, sequence=k)) for k in (1, 2, 3, 4)]
+    assert [isinstance(item, RangeSample) for item in results] == [False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ('changes', 'field'),
+    [
+        ({'anchor_positions': (0.0, 0.0, 2.0)}, 'anchor_positions'),
+        ({'anchor_ids': ('A0', 'A0')}, r'anchor_ids\[1\]'),
+        ({'anchor_ids': ('A0', '')}, r'anchor_ids\[1\]'),
+        ({'anchor_biases': (0.1,)}, 'anchor_biases'),
+        ({'range_std': 0.0}, 'range_std'),
+    ],
+)
+def test_config_bad_value_is_named(changes, field):
+    """A list of the wrong length, a repeated anchor and a zero deviation are named."""
+    with pytest.raises(ConfigError, match=field):
+        CONFIG.replace(**changes)
