@@ -27,6 +27,7 @@ setup(
     entry_points={
         # Commands that need ROS; they join the tablerunner command of the core.
         'tablerunner.commands': [
+            'demo = tablerunner_bringup.commands:demo',
             'launch = tablerunner_bringup.commands:launch',
             'record = tablerunner_bringup.commands:record',
             'play = tablerunner_bringup.commands:play',

@@ -3,16 +3,134 @@
 from __future__ import annotations
 
 import datetime as dt
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tablerunner.errors import TablerunnerError
-from tablerunner_bringup.console import Progress
+from tablerunner.cli.console import Progress
+from tablerunner.cli.exits import FAILED
+from tablerunner_bringup.run_options import RunOptions
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2
+_Scenario = Annotated[
+    Path | None, typer.Option('--scenario', help='Scenario file; the restaurant when not given.')
+]
+_Seed = Annotated[int, typer.Option(min=0, help='Seed of everything that is drawn.')]
+_Factor = Annotated[
+    float, typer.Option('--real-time-factor', min=0.01, max=20.0, help='Simulated s per s.')
+]
+_Domain = Annotated[
+    int | None, typer.Option(help='ROS domain; a simulated run takes a free one of its own.')
+]
+_Estimator = Annotated[str, typer.Option(help='Estimator of fusion_node.')]
+_UnknownStart = Annotated[
+    bool, typer.Option('--unknown-start', help='Do not tell the robot where it stands.')
+]
+
+
+def launch(
+    scenario: _Scenario = None,
+    seed: _Seed = 1,
+    namespace: Annotated[str, typer.Option(help='Namespace of all nodes.')] = '',
+    stops: Annotated[
+        list[str] | None,
+        typer.Option('--deliver', help='Table to go to, then end; may be given often.'),
+    ] = None,
+    wait: Annotated[float, typer.Option(min=0.0, help='Seconds to stand at each table.')] = 3.0,
+    return_home: Annotated[
+        bool, typer.Option('--return-home/--stay', help='Whether to come home afterwards.')
+    ] = True,
+    record_bag: Annotated[bool, typer.Option('--record', help='Record all topics.')] = False,
+    record_topics: Annotated[
+        list[str] | None, typer.Option('--topics', help='Record only these; * and ? allowed.')
+    ] = None,
+    sim: Annotated[
+        bool, typer.Option('--sim/--no-sim', help='Simulate, or drive a real robot.')
+    ] = True,
+    unknown_start: _UnknownStart = False,
+    estimator: _Estimator = 'ekf',
+    real_time_factor: _Factor = 1.0,
+    params: Annotated[
+        list[Path] | None,
+        typer.Option(exists=True, help='ROS parameter file over all others; may be repeated.'),
+    ] = None,
+    domain: _Domain = None,
+    output: Annotated[
+        Path | None, typer.Option('-o', '--output', help='Folder of the run; out/runs/... else.')
+    ] = None,
+) -> None:
+    """Start the whole robot, each node a process of its own, until Ctrl-C or the deliveries' end.
+
+    Example: tablerunner launch --deliver table_3 --deliver table_7 --record
+    """
+    from tablerunner_bringup.launching import LaunchOptions
+    from tablerunner_bringup.launching import launch as run
+    from tablerunner_bringup.session import SessionSettings
+
+    options = LaunchOptions(
+        _run_options(scenario, seed, unknown_start, estimator, real_time_factor, namespace, sim),
+        SessionSettings(
+            record=record_bag or bool(record_topics),
+            record_topics=tuple(map(_absolute, record_topics or ())),
+            domain=domain,
+            parameter_files=tuple(params or ()),
+        ),
+        tuple(stops or ()),
+        wait,
+        return_home,
+        output,
+    )
+    code = run(options, Progress())
+    raise typer.Exit(code)
+
+
+def demo(
+    scenario: _Scenario = None,
+    seed: _Seed = 1,
+    table: Annotated[str, typer.Option(help='Where the meal goes.')] = 'table_3',
+    unknown_start: _UnknownStart = False,
+    estimator: _Estimator = 'ekf',
+    real_time_factor: _Factor = 1.0,
+    domain: _Domain = None,
+    output: Annotated[
+        Path, typer.Option('-o', '--output', help='Folder for the results; emptied first.')
+    ] = Path('out') / 'demo',
+) -> None:
+    """Deliver a meal in the simulated restaurant and judge the trip.
+
+    Writes bag/, trip.png and errors.json. Example: tablerunner demo --table table_7 --seed 5
+    """
+    from tablerunner_bringup.demo import DemoOptions
+    from tablerunner_bringup.demo import demo as run
+
+    options = DemoOptions(
+        _run_options(scenario, seed, unknown_start, estimator, real_time_factor),
+        table,
+        output=output,
+        domain=domain,
+    )
+    code = run(options, Progress())
+    raise typer.Exit(code)
+
+
+def _run_options(
+    scenario: Path | None,
+    seed: int,
+    unknown_start: bool,
+    estimator: str,
+    real_time_factor: float,
+    namespace: str = '',
+    simulated: bool = True,
+) -> RunOptions:
+    return RunOptions(
+        scenario='' if scenario is None else str(scenario),
+        seed=seed,
+        namespace=namespace.strip('/'),
+        simulated=simulated,
+        unknown_start=unknown_start,
+        real_time_factor=real_time_factor,
+        estimator=estimator,
+    )
 
 
 def record(
@@ -57,8 +175,7 @@ def record(
         domain,
     )
     progress = Progress()
-    with _errors_as_exit_codes():
-        written, losses = run(options, progress)
+    written, losses = run(options, progress)
     for topic, count in sorted(losses.missed.items()):
         progress.say(f'{topic}: {count} messages did not arrive here', 'yellow')
     for topic, reason in sorted(losses.refused.items()):
@@ -116,8 +233,7 @@ def play(
         loop,
         domain,
     )
-    with _errors_as_exit_codes():
-        count = run(options, Progress())
+    count = run(options, Progress())
     typer.echo(f'{count} messages of {bag}')
 
 
@@ -130,17 +246,3 @@ def _renaming(text: str) -> tuple[str, str]:
     if not (old and found and new):
         raise typer.BadParameter(f'{text!r}: expected OLD:=NEW', param_hint='--remap')
     return _absolute(old), _absolute(new)
-
-
-class _errors_as_exit_codes:  # noqa: N801 - reads as a statement
-    """Turn what Tablerunner raises on purpose into one line on stderr and an exit code."""
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        from tablerunner_bringup.player import PlayError
-
-        if isinstance(error, TablerunnerError):
-            sys.stderr.write(f'tablerunner: {error}\n')
-            raise typer.Exit(FAILED if isinstance(error, PlayError) else BAD_INPUT) from error

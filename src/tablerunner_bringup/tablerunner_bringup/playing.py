@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tablerunner.bags.reader import BagReader
+from tablerunner.cli.console import Progress
 from tablerunner.errors import BagError
-from tablerunner_bringup.console import Progress
 from tablerunner_bringup.interrupts import Interrupts
 from tablerunner_bringup.message_types import MessageTypeError, message_class
 from tablerunner_bringup.player import Message, Pace, Player, Track
+from tablerunner_bringup.polling import bare_node
 from tablerunner_bringup.qos_matching import offered_profiles
 from tablerunner_bringup.recorder import Selection
-from tablerunner_bringup.recording import bare_node
 
 
 @dataclass(frozen=True)

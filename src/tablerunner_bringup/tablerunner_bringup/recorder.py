@@ -19,6 +19,7 @@ from tablerunner.bags.definitions import types_for
 from tablerunner.bags.writer import BagWriter
 from tablerunner.errors import BagError
 from tablerunner_bringup.message_types import MessageTypeError, message_class
+from tablerunner_bringup.polling import never_called, take_all
 from tablerunner_bringup.qos_matching import recorded_quality, subscription_profile
 
 CLOCK = '/clock'
@@ -124,7 +125,7 @@ class Recorder:
         self._clock_subscription = None
         if use_sim_time:
             self._clock_subscription = node.create_subscription(
-                Clock, CLOCK, _never_called, QoSProfile(depth=1000), raw=True
+                Clock, CLOCK, never_called, QoSProfile(depth=1000), raw=True
             )
 
     @property
@@ -199,12 +200,12 @@ class Recorder:
         if self._clock_subscription is not None:
             yield [
                 Arrival(info['received_timestamp'], '', data)
-                for data, info in _take_all(self._clock_subscription)
+                for data, info in take_all(self._clock_subscription)
             ]
         for topic, track in self._tracks.items():
             yield [
                 self._arrival(topic, track, data, info)
-                for data, info in _take_all(track.subscription)
+                for data, info in take_all(track.subscription)
             ]
 
     def _arrival(self, topic: str, track: _Track, data: bytes, info: dict[str, int]) -> Arrival:
@@ -238,22 +239,8 @@ class Recorder:
 
     def _subscribe(self, topic: str, msgtype: str, profile: QoSProfile) -> Subscription:
         return self._node.create_subscription(
-            message_class(msgtype), topic, _never_called, profile, raw=True
+            message_class(msgtype), topic, never_called, profile, raw=True
         )
-
-
-def _never_called(message: bytes) -> None:
-    """Stand where rclpy wants a callback; messages are taken by polling."""
-
-
-def _take_all(subscription: Subscription) -> Iterator[tuple[bytes, dict[str, int]]]:
-    # The way rclpy's own executor takes messages; rclpy has no public one beside an executor.
-    with subscription.handle:
-        while True:
-            taken = subscription.handle.take_message(subscription.msg_type, True)
-            if taken is None:
-                return
-            yield taken
 
 
 def _asks_more(now: QoSProfile, possible: QoSProfile) -> bool:

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import rclpy
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-
 from tablerunner.bags.writer import BagWriter
-from tablerunner_bringup.console import Progress
+from tablerunner.cli.console import Progress
 from tablerunner_bringup.interrupts import Interrupts
+from tablerunner_bringup.polling import bare_node
 from tablerunner_bringup.recorder import Losses, Recorder, Selection
 
 _POLL_S = 0.005
@@ -81,19 +76,3 @@ def _take_last_words(recorder: Recorder) -> None:
         recorder.drain()
         time.sleep(_POLL_S)
     recorder.finish()
-
-
-@contextlib.contextmanager
-def bare_node(name: str, domain: int | None = None) -> Iterator[Node]:
-    """Make a node without services of its own, in a context whose signals are left to us."""
-    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = rclpy.create_node(
-            name, start_parameter_services=False, enable_rosout=False, use_global_arguments=False
-        )
-        try:
-            yield node
-        finally:
-            node.destroy_node()
-    finally:
-        rclpy.try_shutdown()

@@ -79,6 +79,11 @@ class Supervisor:
                 endings.append(ending)
         return tuple(endings)
 
+    def interrupt(self, name: str) -> None:
+        """Ask a child to end, and do not wait; its end is not news then."""
+        self._seen.add(name)
+        self._children[name].send(signal.SIGINT)
+
     def stop(
         self,
         names: Iterable[str] | None = None,

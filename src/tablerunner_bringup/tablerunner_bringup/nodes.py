@@ -1,0 +1,50 @@
+"""The nodes of a run: the one list that launcher and launch file are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from tablerunner.scenario import Scenario
+from tablerunner_bringup import parameters
+from tablerunner_bringup.run_options import RunOptions
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """One node: where its program is, what it is called, how a run becomes its parameters."""
+
+    name: str
+    package: str
+    executable: str
+    parameters: Callable[[Scenario, RunOptions], dict[str, Any]]
+    simulation_only: bool = False
+    remap: tuple[tuple[str, str], ...] = ()
+
+
+NODES: tuple[NodeSpec, ...] = (
+    NodeSpec('uwb_driver', 'uwb_driver', 'uwb_driver', parameters.uwb_driver),
+    NodeSpec('odom_node', 'odom_node', 'odom_node', parameters.odom_node),
+    NodeSpec('fusion_node', 'fusion_node', 'fusion_node', parameters.fusion_node),
+    NodeSpec('safety_stop', 'nav_controller', 'safety_stop', parameters.safety_stop),
+    NodeSpec('nav_controller', 'nav_controller', 'nav_controller', parameters.nav_controller),
+    NodeSpec(
+        'sim_bridge',
+        'sim_bridge',
+        'sim_bridge',
+        parameters.sim_bridge,
+        simulation_only=True,
+        # In a namespace too: every node of ROS listens to the clock there and nowhere else.
+        remap=(('clock', '/clock'),),
+    ),
+)
+"""All nodes; they may be started in any order, and side by side."""
+
+COMMANDING = 'nav_controller'
+"""The node whose end takes the command away: the safety stop behind it goes to zero on silence."""
+
+
+def nodes_of(options: RunOptions) -> tuple[NodeSpec, ...]:
+    """Return the nodes of a run: on a real robot none that simulates."""
+    return tuple(spec for spec in NODES if options.simulated or not spec.simulation_only)

@@ -1,0 +1,101 @@
+"""From a scenario to the parameters of each node: the only place where that is done.
+
+What a node's Config has a default for and the scenario says nothing of is left to that default.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tablerunner.scenario import Scenario
+from tablerunner_bringup.run_options import RunOptions
+
+Parameters = dict[str, Any]
+
+
+def uwb_driver(scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return where the anchors hang."""
+    return {
+        **_common(options),
+        'anchor_ids': [anchor.id for anchor in scenario.anchors],
+        'anchor_positions': [
+            float(number) for anchor in scenario.anchors for number in anchor.position
+        ],
+        'tag_height': float(scenario.robot.tag_position[2]),
+    }
+
+
+def odom_node(scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return the geometry of the drive."""
+    return {
+        **_common(options),
+        'wheels': {
+            'wheel_radius': float(scenario.robot.wheel_radius),
+            'track': float(scenario.robot.track),
+        },
+    }
+
+
+def fusion_node(scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return the tag's place and, unless it is to be found, where the robot starts."""
+    parameters = {
+        **_common(options),
+        'estimator': options.estimator,
+        'tag_position': [float(number) for number in scenario.robot.tag_position],
+    }
+    if not options.unknown_start:
+        start = scenario.start_pose
+        parameters['initial_pose'] = [float(start.x), float(start.y), float(start.heading)]
+    return parameters
+
+
+def nav_controller(_scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return the map, which the node reads from the scenario itself."""
+    return {**_common(options), 'scenario': _path(options)}
+
+
+def safety_stop(_scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return the robot's body, which the node reads from the scenario itself."""
+    return {**_common(options), 'scenario': _path(options)}
+
+
+def sim_bridge(_scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return the room, the seed and the speed of simulated time."""
+    return {
+        'scenario': _path(options),
+        'seed': int(options.seed),
+        'real_time_factor': float(options.real_time_factor),
+    }
+
+
+def _common(options: RunOptions) -> Parameters:
+    return {'use_sim_time': options.simulated}
+
+
+def _path(options: RunOptions) -> str:
+    # A node has a working directory of its own choosing.
+    return str(options.scenario_path.resolve())
+
+
+def write(path: Path, node: str, parameters: Parameters) -> None:
+    """Write a ROS parameter file for one node, in whatever namespace it runs.
+
+    Empty lists are left out: ROS cannot tell their type, and no node needs to be told of them.
+    """
+    told = flat(parameters)
+    text = yaml.safe_dump({f'/**/{node}': {'ros__parameters': told}}, sort_keys=False)
+    path.write_text(text, encoding='utf-8')
+
+
+def flat(parameters: Parameters, prefix: str = '') -> Parameters:
+    """Return parameters by their full dotted names, as ROS knows them, without empty lists."""
+    found: Parameters = {}
+    for name, value in parameters.items():
+        if isinstance(value, dict):
+            found.update(flat(value, f'{prefix}{name}.'))
+        elif value != []:
+            found[f'{prefix}{name}'] = value
+    return found

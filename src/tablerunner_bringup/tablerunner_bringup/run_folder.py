@@ -1,0 +1,61 @@
+"""The folder of one run: parameter files, logs, the bag."""
+
+from __future__ import annotations
+
+import datetime as dt
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Where a run puts what it writes."""
+
+    path: Path
+
+    @classmethod
+    def new(cls, parent: Path, name: str) -> RunFolder:
+        """Make a folder that no other run has, named by the time and, if need be, a number.
+
+        Raises
+        ------
+        OSError
+            It cannot be made.
+        """
+        stamp = dt.datetime.now().astimezone().strftime('%Y-%m-%d_%H-%M-%S')
+        number = 1
+        while True:
+            path = parent / (f'{stamp}_{name}' if number == 1 else f'{stamp}_{name}_{number}')
+            try:
+                path.mkdir(parents=True)
+            except FileExistsError:
+                number += 1
+                continue
+            return cls(path)
+
+    def prepare(self, scenario: Path) -> RunFolder:
+        """Make the folders inside and copy the scenario into it, for whoever reads the bag."""
+        self.logs.mkdir(parents=True, exist_ok=True)
+        self.parameters.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(scenario, self.path / 'scenario.yaml')
+        return self
+
+    @property
+    def logs(self) -> Path:
+        """Folder of the logs, one for each process."""
+        return self.path / 'logs'
+
+    @property
+    def parameters(self) -> Path:
+        """Folder of the ROS parameter files, one for each node."""
+        return self.path / 'params'
+
+    @property
+    def bag(self) -> Path:
+        """Folder of the bag; made by the recorder."""
+        return self.path / 'bag'
+
+    def log(self, name: str) -> Path:
+        """Return the log of a process."""
+        return self.logs / f'{name}.log'
