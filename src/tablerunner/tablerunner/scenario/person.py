@@ -52,7 +52,8 @@ class Person(Config):
         """Refuse a route without points or with the same point twice in a row."""
         if not self.route:
             raise ConfigError('route', [], 'at least one point')
-        for index in range(1, len(self.route)):
+        first = 0 if self.loop and len(self.route) > 1 else 1  # a loop joins last to first
+        for index in range(first, len(self.route)):
             if math.dist(self.route[index - 1], self.route[index]) < 1e-6:
                 raise ConfigError(
                     f'route[{index}]',

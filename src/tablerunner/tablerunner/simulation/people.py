@@ -15,7 +15,6 @@ from tablerunner.simulation.streams import stream
 from tablerunner.simulation.truth import PersonState
 
 _AHEAD_RAD = math.radians(70.0)  # the robot is in the way within this of the walking direction
-_TOUCH_M = 0.005
 
 
 class Walker:
@@ -71,19 +70,22 @@ class Walker:
             return False
         if self._yields is None:
             self._yields = bool(self._random.random() < self._person.yield_probability)
-        return self._yields or gap < _TOUCH_M
+        return self._yields or gap <= 0.0
 
     def _walk(self, dt_s: float) -> None:
         left = self._person.speed * dt_s
-        to_x, to_y = self._route[self._next]
-        distance = math.hypot(to_x - self._x, to_y - self._y)
         self.speed_m_s = self._person.speed
-        if distance <= left:
+        while self._pause_s <= 0.0:
+            to_x, to_y = self._route[self._next]
+            distance = math.hypot(to_x - self._x, to_y - self._y)
+            if distance > left:
+                self._x += left * math.cos(self._heading)
+                self._y += left * math.sin(self._heading)
+                return
+            left -= distance
             self._x, self._y = to_x, to_y
             self._arrive()
-            return
-        self._x += left * math.cos(self._heading)
-        self._y += left * math.sin(self._heading)
+            self._heading = self._course()
 
     def _arrive(self) -> None:
         chance, length = self._random.random(), self._random.exponential(1.0)

@@ -27,8 +27,7 @@ anchors:
   - {id: A0, position: [0.1, 0.1, 2.25]}
   - {id: A1, position: [9.9, 0.1, 2.25]}
 people:
-  - name: waiter
-    route: [[5.0, 1.0], [5.0, 9.0]]
+  - {name: waiter, route: [[5.0, 1.0], [5.0, 9.0]]}
 routes:
   tour: [[5.0, 5.0], [8.0, 5.0]]
 robot:
@@ -99,6 +98,12 @@ CASES = {
         '[[3.0, 1.0], [3.0, 5.0]]',
         'people[0].route[1]',
         'clear of table_1',
+    ),
+    'loop closed twice': (
+        'route: [[5.0, 1.0], [5.0, 9.0]]',
+        'route: [[5.0, 1.0], [5.0, 9.0], [5.0, 1.0]], loop: true',
+        'people[0].route[0]',
+        'apart from the one before',
     ),
     'person without a way': ('[[5.0, 1.0], [5.0, 9.0]]', '[]', 'people[0].route', 'one point'),
     'route into a wall': ('[8.0, 5.0]]', '[9.9, 5.0]]', 'routes.tour[1]', 'clear of hull'),
