@@ -14,7 +14,9 @@ and the largest speed whose d(v) fits into a free way F is
 
 from __future__ import annotations
 
-import math
+import numpy as np
+
+from tablerunner.types import Vector
 
 
 def stopping_distance(
@@ -37,10 +39,14 @@ def stopping_distance(
     return speed * delay + 0.5 * speed * brake + approach * (delay + brake)
 
 
-def largest_speed(way: float, delay: float, deceleration: float, approach: float = 0.0) -> float:
-    """Return the speed from which the robot stands within `way` [m/s], (2); arguments as above."""
-    room = way - approach * delay
-    if room <= 0.0:
-        return 0.0
-    wait = delay + approach / deceleration
-    return deceleration * (math.sqrt(wait**2 + 2.0 * room / deceleration) - wait)
+def largest_speed(
+    way: Vector | float, delay: float, deceleration: float, approach: Vector | float = 0.0
+) -> Vector:
+    """Return the speeds from which the robot stands within each `way` [m/s], (2).
+
+    Arguments as above; `way` and `approach` may be arrays, which are broadcast.
+    """
+    room = np.maximum(way - approach * np.float64(delay), 0.0)
+    wait = delay + approach / np.float64(deceleration)
+    root = np.sqrt(wait**2 + 2.0 * room / deceleration)
+    return np.asarray(deceleration * (root - wait))

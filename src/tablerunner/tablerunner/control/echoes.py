@@ -11,37 +11,83 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
-from tablerunner.types import Refusal, UltrasonicSample, Vector, Velocity, seconds
+from tablerunner.types import NANOSECONDS, Refusal, UltrasonicSample, Vector, Velocity, seconds
 
 _ARC_POINTS = 7
 _FUTURE_S = 0.1  # clocks of two machines may differ by this
+_CLOSING_M_S = 0.25  # several times what the noise of two readings makes of a thing at rest
+_COMPARE_S = 0.5  # readings farther apart are not compared
+_SIDE_RAD = math.radians(60.0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Echo:
     stamp: int
     sensor: str
-    points: Vector  # (_ARC_POINTS, 2) in base_link; empty: nothing was there
+    points: Vector  # (_ARC_POINTS, 2) in base_link, from right to left; empty: nothing was there
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """Where something may be: one row for each point of each echo that counts.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        In base_link [m].
+    ages_s : ndarray, shape (n,)
+        Since they were heard [s].
+    closing : ndarray of bool, shape (n,)
+        Whether it came nearer by itself, or has only just appeared.
+    beside : ndarray of bool, shape (n,)
+        Whether a sensor heard it that looks to the side.
+    sensors : tuple of str
+    """
+
+    points: Vector
+    ages_s: Vector
+    closing: NDArray[np.bool_]
+    beside: NDArray[np.bool_]
+    sensors: tuple[str, ...]
 
 
 class EchoMemory:
     """The last echoes of each sensor, moved with the robot.
 
+    A flat thing met at a slant mirrors the sound away, so silence does not prove that what was
+    heard has gone: an echo is kept for a while although the sensor does not hear it again, for
+    longer when it is near.
+
     Parameters
     ----------
     mounts : dict of str to Pose2
         Pose of each sensor in base_link, by frame name.
-    hold_s : float
+    hold_s, hold_near_s : float
         How long an echo counts although the sensor has fired again without it [s].
+    near_m : float
+        Distance from base_link up to which `hold_near_s` counts [m].
     """
 
-    def __init__(self, mounts: dict[str, Pose2], hold_s: float) -> None:
+    def __init__(
+        self, mounts: dict[str, Pose2], hold_s: float, hold_near_s: float, near_m: float
+    ) -> None:
         self.mounts = dict(mounts)
-        self.hold_s = hold_s
+        self._beside = {
+            name: abs(difference(mount.heading, 0.0)) >= _SIDE_RAD
+            for name, mount in mounts.items()
+        }
+        self.configure(hold_s, hold_near_s, near_m)
         self._echoes: list[_Echo] = []
-        self._last: dict[str, int] = {}
+        self._last: dict[str, _Echo] = {}
+        self._closing_until: dict[str, int] = {}
+
+    def configure(self, hold_s: float, hold_near_s: float, near_m: float) -> None:
+        """Use other times from now on."""
+        self._hold_s, self._hold_near_s, self._near_m = hold_s, hold_near_s, near_m
 
     def add(self, sample: UltrasonicSample, now: int) -> Refusal | None:
         """Take one reading.
@@ -53,11 +99,13 @@ class EchoMemory:
         reason = self._fault(sample, now)
         if reason is not None:
             return Refusal(sample.stamp, f'ultrasonic/{sample.sensor}', sample.sensor, reason)
-        self._last[sample.sensor] = sample.stamp
-        points = self._arc(sample)
         # The echoes at hand are in the frame of now; at walking pace the few milliseconds between
         # firing and arrival do not matter, and the age is charged to whoever approaches.
-        self._echoes.append(_Echo(sample.stamp, sample.sensor, points))
+        echo = _Echo(sample.stamp, sample.sensor, self._arc(sample))
+        if self._is_closing(echo):
+            self._closing_until[sample.sensor] = sample.stamp + NANOSECONDS
+        self._echoes.append(echo)
+        self._last[sample.sensor] = echo
         return None
 
     def _fault(self, sample: UltrasonicSample, now: int) -> str | None:
@@ -71,7 +119,8 @@ class EchoMemory:
             return 'no stamp'
         if seconds(sample.stamp - now) > _FUTURE_S:
             return 'stamp in the future'
-        if sample.stamp <= self._last.get(sample.sensor, 0):
+        last = self._last.get(sample.sensor)
+        if last is not None and sample.stamp <= last.stamp:
             return 'stamp not after the last'
         if not (math.isfinite(sample.field_of_view_rad) and sample.field_of_view_rad >= 0.0):
             return 'field of view is not a finite angle'
@@ -88,6 +137,23 @@ class EchoMemory:
         local = distance * np.column_stack([np.cos(angles), np.sin(angles)])
         return self.mounts[sample.sensor].transform(local)
 
+    def _is_closing(self, echo: _Echo) -> bool:
+        """Return whether what is heard now came nearer than the robot's motion explains."""
+        if not len(echo.points):
+            return False
+        last = self._last.get(echo.sensor)
+        if last is None or not len(last.points):
+            return True
+        apart_s = seconds(echo.stamp - last.stamp)
+        if apart_s > _COMPARE_S:
+            return True
+        mount = self.mounts[echo.sensor]
+        place = np.array([mount.x, mount.y])
+        now_m = float(np.linalg.norm(echo.points[0] - place))
+        # The nearest point of the old arc: where in the cone the echo came from is not known.
+        before_m = float(np.min(np.linalg.norm(last.points - place, axis=1)))
+        return before_m - now_m > _CLOSING_M_S * apart_s + 0.02
+
     def move(self, motion: Velocity, dt: float) -> None:
         """Carry the echoes along while the robot drives with `motion` for `dt` [s]."""
         if dt <= 0.0 or not self._echoes:
@@ -98,35 +164,48 @@ class EchoMemory:
         self._echoes = [
             _Echo(echo.stamp, echo.sensor, moved.transform(echo.points)) for echo in self._echoes
         ]
+        for echo in self._echoes:
+            if echo.stamp == self._last[echo.sensor].stamp:
+                self._last[echo.sensor] = echo
 
     def forget(self, now: int) -> None:
-        """Drop what is older than the hold time, but never the last reading of a sensor."""
-        self._echoes = [
-            echo
-            for echo in self._echoes
-            if echo.stamp == self._last[echo.sensor] or seconds(now - echo.stamp) <= self.hold_s
-        ]
+        """Drop what is older than the hold times, but never the last reading of a sensor."""
+        self._echoes = [echo for echo in self._echoes if self._counts(echo, now)]
+
+    def _counts(self, echo: _Echo, now: int) -> bool:
+        if echo.stamp == self._last[echo.sensor].stamp:
+            return True
+        if not len(echo.points):
+            return False
+        age_s = seconds(now - echo.stamp)
+        if age_s <= self._hold_s:
+            return True
+        middle = echo.points[len(echo.points) // 2]
+        return age_s <= self._hold_near_s and float(np.hypot(*middle)) <= self._near_m
 
     def age_s(self, sensor: str, now: int) -> float:
         """Return how long ago a sensor was last heard [s]; inf: never."""
         last = self._last.get(sensor)
-        return math.inf if last is None else seconds(now - last)
+        return math.inf if last is None else seconds(now - last.stamp)
 
-    def points(self, now: int) -> tuple[Vector, Vector, tuple[str, ...]]:
-        """Return where something may be: points (n, 2), ages [s] (n,), sensors (n)."""
+    def heard(self, now: int) -> Heard | None:
+        """Return what counts now; None: nothing."""
         kept = [echo for echo in self._echoes if len(echo.points)]
         if not kept:
-            return np.empty((0, 2)), np.empty(0), ()
-        ages = [max(seconds(now - echo.stamp), 0.0) for echo in kept]
+            return None
         count = [len(echo.points) for echo in kept]
-        names = tuple(echo.sensor for echo in kept for _ in range(len(echo.points)))
-        return (
+        ages = [max(seconds(now - echo.stamp), 0.0) for echo in kept]
+        closing = [self._closing_until.get(echo.sensor, 0) > now for echo in kept]
+        return Heard(
             np.concatenate([echo.points for echo in kept]),
             np.repeat(ages, count),
-            names,
+            np.repeat(closing, count),
+            np.repeat([self._beside[echo.sensor] for echo in kept], count),
+            tuple(echo.sensor for echo in kept for _ in range(len(echo.points))),
         )
 
     def reset(self) -> None:
         """Forget everything (time went back)."""
         self._echoes = []
         self._last = {}
+        self._closing_until = {}

@@ -146,8 +146,8 @@ class FloorMap:
 def _to_segments(xs: Vector, ys: Vector, segments: Vector) -> Vector:
     """Return the distance of each cell to the nearest segment, (rows * columns,).
 
-    One segment after the other over the whole grid: many times faster than all pairs at once, whose
-    intermediate arrays do not fit into a cache.
+    One segment after the other over the whole grid: many times faster than all pairs at once,
+    whose intermediate arrays do not fit into a cache.
     """
     nearest = np.full((len(ys), len(xs)), np.inf)
     for (x0, y0), (x1, y1) in segments:
@@ -158,7 +158,7 @@ def _to_segments(xs: Vector, ys: Vector, segments: Vector) -> Vector:
         np.clip(share, 0.0, 1.0, out=share)
         away = (off_x[None] - share * along_x) ** 2 + (off_y[:, None] - share * along_y) ** 2
         np.minimum(nearest, away, out=nearest)
-    return np.sqrt(nearest).ravel()
+    return np.asarray(np.sqrt(nearest).ravel())
 
 
 def _with_discs(distance: Vector, centres: Vector, discs: tuple[Disc, ...]) -> Vector:

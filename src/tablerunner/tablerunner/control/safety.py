@@ -21,6 +21,7 @@ from tablerunner.types import Refusal, UltrasonicSample, Vector, Velocity, secon
 
 _STEP_M = 0.02  # spacing of the places that are tried along the way ahead
 _TURN_RATE_MIN = 1e-3
+_SLANT = math.sqrt(2.0)  # something beside the robot may close in at up to 45 degrees
 
 
 class SafetyState(str, Enum):
@@ -92,19 +93,20 @@ class SafetyStop:
     ) -> None:
         self.config = config
         self.limits = limits
-        self._echoes = EchoMemory(mounts, config.hold_time)
+        self._echoes = EchoMemory(mounts, *_holds(config))
         self._now = 0
         self._last = Velocity()
         self._stopped = False
         self._clear_since: int | None = None
         self._reversed_m = 0.0
+        self._cautious_m = 0.0
         self._emergency: str | None = None
 
     def configure(self, config: SafetyConfig, limits: VelocityLimits) -> None:
         """Use other settings from now on; what was heard stays."""
         self.config = config
         self.limits = limits
-        self._echoes.hold_s = config.hold_time
+        self._echoes.configure(*_holds(config))
 
     def add_reading(self, sample: UltrasonicSample, now: int) -> Refusal | None:
         """Take an ultrasonic reading; a refused one counts as silence."""
@@ -164,6 +166,7 @@ class SafetyStop:
             self._reversed_m -= self._last.linear_m_s * dt
         elif self._last.linear_m_s > 0:
             self._reversed_m = 0.0
+            self._cautious_m -= self._last.linear_m_s * dt
         reasons = self._halts(now, command, command_stamp, localisation)
         if fault:
             reasons.insert(0, fault)
@@ -215,6 +218,8 @@ class SafetyStop:
             top, way, obstacle, sensor = self._allowed(now, wanted)
             if self._hold(now, top):
                 top = 0.0
+            elif self._cautious_m > 0.0:
+                top = min(top, config.restart_speed)
             if top < wanted.linear_m_s:
                 blocked = True
                 reasons.append(f'obstacle: {sensor}' if sensor else 'way not yet clear again')
@@ -263,8 +268,9 @@ class SafetyStop:
 
     def _hold(self, now: int, top: float) -> bool:
         """Return whether a stop for something in the way lasts, given the speed allowed now."""
-        if top <= 0.0:
+        if top < self.config.stop_speed:
             self._stopped, self._clear_since = True, None
+            self._cautious_m = self.config.restart_distance
             return True
         if not self._stopped:
             return False
@@ -283,25 +289,26 @@ class SafetyStop:
     ) -> tuple[float, float, tuple[float, float] | None, str]:
         """Return the allowed speed, the free way, and what ends it and who heard it."""
         config = self.config
-        points, ages, sensors = self._echoes.points(now)
-        if len(points) == 0:
+        heard = self._echoes.heard(now)
+        if heard is None:
             return math.inf, math.inf, None, ''
-        ways = self._free_ways(points, wanted)
-        best_speed, best = math.inf, -1
-        for index in np.flatnonzero(np.isfinite(ways)):
-            way = float(ways[index]) - config.margin
-            static = largest_speed(way, config.delay, config.deceleration)
-            closing = way - config.approach_speed * float(ages[index])
-            moving = largest_speed(
-                closing, config.delay, config.deceleration, config.approach_speed
-            )
-            speed = max(moving, min(static, config.creep_speed))
-            if speed < best_speed:
-                best_speed, best = speed, int(index)
-        if best < 0:
+        ways = self._free_ways(heard.points, wanted) - config.margin
+        # Who walks towards the robot goes on walking, also while the echo grows old.
+        approach = np.where(heard.closing, config.approach_speed, 0.0)
+        speeds = largest_speed(
+            ways - approach * heard.ages_s, config.delay, config.deceleration, approach
+        )
+        gaps = np.linalg.norm(heard.points, axis=1) - config.footprint_radius
+        beside = largest_speed(
+            gaps * _SLANT - config.side_margin, config.delay, config.deceleration
+        )
+        beside = np.maximum(beside, config.creep_speed)
+        speeds = np.minimum(speeds, np.where(heard.beside, beside, np.inf))
+        best = int(np.argmin(speeds))
+        if not np.isfinite(speeds[best]):
             return math.inf, math.inf, None, ''
-        obstacle = (float(points[best, 0]), float(points[best, 1]))
-        return best_speed, float(ways[best]), obstacle, sensors[best]
+        obstacle = (float(heard.points[best, 0]), float(heard.points[best, 1]))
+        return float(speeds[best]), float(ways[best]), obstacle, heard.sensors[best]
 
     def _free_ways(self, points: Vector, wanted: Velocity) -> Vector:
         """Return how far the hull can go along the wanted arc before it meets each point [m].
@@ -335,3 +342,7 @@ class SafetyStop:
         meets[leaving] = False
         first = np.argmax(meets, axis=1)
         return np.where(meets.any(axis=1), along[first], np.inf)
+
+
+def _holds(config: SafetyConfig) -> tuple[float, float, float]:
+    return config.hold_time, config.hold_time_near, config.footprint_radius + config.near

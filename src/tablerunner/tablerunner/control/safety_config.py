@@ -67,7 +67,7 @@ class SafetyConfig(Config):
         dynamic=True,
     )
     margin: float = parameter(
-        0.08,
+        0.1,
         description='Distance from hull to obstacle that is left when standing',
         unit='m',
         low=0.0,
@@ -81,17 +81,24 @@ class SafetyConfig(Config):
         dynamic=True,
     )
     approach_speed: float = parameter(
-        0.5,
-        description='Speed at which a person is taken to come nearer',
+        1.0,
+        description='Speed at which somebody who comes nearer is taken to walk on',
         unit='m/s',
         low=0.0,
         dynamic=True,
     )
     creep_speed: float = parameter(
         0.12,
-        description='Speed that is allowed near things as long as they stand still',
+        description='Speed that is allowed beside things however near they are',
         unit='m/s',
         low=0.0,
+        dynamic=True,
+    )
+    stop_speed: float = parameter(
+        0.03,
+        description='Where only less than this would be allowed, the robot stands',
+        unit='m/s',
+        above=0.0,
         dynamic=True,
     )
     release_speed: float = parameter(
@@ -109,7 +116,39 @@ class SafetyConfig(Config):
         dynamic=True,
     )
     hold_time: float = parameter(
-        0.6, description='How long an echo counts that is not heard again', unit='s', low=0.0
+        0.6,
+        description='How long an echo counts that is not heard again',
+        unit='s',
+        low=0.0,
+        dynamic=True,
+    )
+    hold_time_near: float = parameter(
+        3.0,
+        description='The same for something near: sound may be mirrored away from it',
+        unit='s',
+        low=0.0,
+        dynamic=True,
+    )
+    near: float = parameter(
+        0.5,
+        description='Distance from the hull that counts as near',
+        unit='m',
+        low=0.0,
+        dynamic=True,
+    )
+    restart_speed: float = parameter(
+        0.2,
+        description='Largest speed after a stop for something in the way',
+        unit='m/s',
+        above=0.0,
+        dynamic=True,
+    )
+    restart_distance: float = parameter(
+        0.25,
+        description='Way after a stop up to which that counts',
+        unit='m',
+        low=0.0,
+        dynamic=True,
     )
     turn_rate_near: float = parameter(
         0.6,
@@ -132,5 +171,7 @@ class SafetyConfig(Config):
             raise ConfigError(
                 'position_std_stop', self.position_std_stop, 'at least position_std_slow'
             )
-        if self.creep_speed < self.release_speed:
-            raise ConfigError('release_speed', self.release_speed, 'at most creep_speed')
+        if not self.stop_speed <= self.release_speed <= self.creep_speed:
+            raise ConfigError(
+                'release_speed', self.release_speed, 'from stop_speed to creep_speed'
+            )
