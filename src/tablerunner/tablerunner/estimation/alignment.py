@@ -118,18 +118,21 @@ def align(window: Window, bias_prior: Matrix, config: AlignmentConfig) -> Alignm
     mean, cost, normal = _minimise(window, prior)
     order = np.argsort(cost)
     best = order[0]
-    eigenvalues = np.linalg.eigvalsh(normal[best])
+    information = normal[best].copy()
+    # All that is known of a heading beforehand; it matters only while nothing else is.
+    information[2, 2] += 1.0 / UNKNOWN_YAW_VARIANCE
+    eigenvalues = np.linalg.eigvalsh(information)
     if eigenvalues[0] <= 1e-9 * eigenvalues[-1]:
         return None
     residual, _ = _residuals(mean[best : best + 1], window)
     scale = _scatter(residual[0])
-    covariance = np.linalg.inv(normal[best]) * max(1.0, scale)
+    covariance = np.linalg.inv(information) * max(1.0, scale)
     covariance[2, 2] += window.turned_variance
     turned = np.abs(wrap(mean[:, 2] - mean[best, 2]))
     rivals = cost[turned > _SAME_HEADING]
     lead = (float(rivals.min()) - float(cost[best])) / max(1.0, scale) if len(rivals) else np.inf
     words = _missing(covariance, lead, config)
-    if covariance[2, 2] > UNKNOWN_YAW_VARIANCE or lead < config.ambiguity:
+    if covariance[2, 2] > 0.5 * UNKNOWN_YAW_VARIANCE or lead < config.ambiguity:
         covariance = _without_heading(covariance, mean, cost, int(best), max(1.0, scale))
     return Alignment(mean[best], covariance, not words, words)
 
@@ -211,7 +214,7 @@ def _expand(mean: Matrix, window: Window, prior: Matrix) -> tuple[Vector, Matrix
 
 
 def _scatter(residual: Vector) -> float:
-    """Return the variance of weighted residuals, from their median: 1 where the noise is as told."""
+    """Return the variance of weighted residuals, by their median: 1 for noise as told."""
     return float((np.median(np.abs(residual)) / 0.6745) ** 2)
 
 
