@@ -22,6 +22,7 @@ _METADATA, _DATA_END = 0x0C, 0x0F
 _LAST_OPCODE = 0x0F
 _PREFIX = struct.Struct('<BQ')
 _MESSAGE_HEAD = struct.Struct('<HIQQ')
+_MESSAGE_START = struct.Struct('<BQHIQQ')  # prefix and head together
 _CHUNK_HEAD = struct.Struct('<QQQI')
 _U16 = struct.Struct('<H')
 _U32 = struct.Struct('<I')
@@ -35,8 +36,9 @@ _KEPT_CHUNKS = 4
 class McapStorage:
     """One MCAP file; see `tablerunner.bags.storage.Storage`."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, number: int = 0) -> None:
         self.path = path
+        self._number = number
         self.channels: dict[int, Channel] = {}
         self.entries: list[Entry] = []
         self.damage: list[Damage] = []
@@ -59,9 +61,9 @@ class McapStorage:
             self._map.close()
         self._file.close()
 
-    def load(self, place: tuple[int, int, int]) -> bytes:
-        """Return the serialised message at a place."""
-        chunk, start, end = place
+    def load(self, entry: Entry) -> bytes:
+        """Return the serialised message of an entry."""
+        chunk, start, end = entry[4:]
         if chunk < 0:
             return self._data[start:end]
         if chunk not in self._loaded:
@@ -155,7 +157,19 @@ class McapStorage:
         self, number: int, raw: bytes | memoryview, complete: bool, position: int
     ) -> None:
         here, size = 0, len(raw)
+        entries, file, unpack = self.entries, self._number, _MESSAGE_START.unpack_from
         while size - here >= _PREFIX.size:
+            # Nearly all are messages: read them without a call each.
+            while size - here >= _MESSAGE_START.size:
+                opcode, length, channel, _, stamp, _ = unpack(raw, here)
+                end = here + _PREFIX.size + length
+                if opcode != _MESSAGE or length < _MESSAGE_HEAD.size or end > size:
+                    break
+                start = here + _MESSAGE_START.size
+                entries.append((stamp, file, len(entries), channel, number, start, end))
+                here = end
+            if size - here < _PREFIX.size:
+                break
             opcode, length = _PREFIX.unpack_from(raw, here)
             body = here + _PREFIX.size
             end = body + length
@@ -185,8 +199,10 @@ class McapStorage:
             channel, _, stamp, _ = _MESSAGE_HEAD.unpack_from(data, body)
             if body + _MESSAGE_HEAD.size > end:
                 raise struct.error
-            place = (chunk, body + _MESSAGE_HEAD.size, end)
-            self.entries.append(Entry(stamp, len(self.entries), channel, place))
+            start = body + _MESSAGE_HEAD.size
+            self.entries.append(
+                (stamp, self._number, len(self.entries), channel, chunk, start, end)
+            )
         elif opcode == _SCHEMA:
             (key,) = _U16.unpack_from(data, body)
             name, here = _text(data, body + 2, end)
@@ -242,9 +258,9 @@ class McapStorage:
     def _settle_orphans(self) -> None:
         """Drop messages whose topic is not known, and say so."""
         known = {key for key, channel in self.channels.items() if channel.msgtype}
-        lost = sum(entry.channel not in known for entry in self.entries)
+        lost = sum(entry[3] not in known for entry in self.entries)
         if lost:
-            self.entries = [entry for entry in self.entries if entry.channel in known]
+            self.entries = [entry for entry in self.entries if entry[3] in known]
             self._note('', 'the record that names a topic is missing', f'{lost} messages of it '
                        'cannot be read')
 

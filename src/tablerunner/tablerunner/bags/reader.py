@@ -18,7 +18,7 @@ from tablerunner.bags.definitions import TypeStore, known_types, parse_definitio
 from tablerunner.bags.folder import METADATA, BagFolder
 from tablerunner.bags.mcap import McapStorage
 from tablerunner.bags.sqlite import SqliteStorage
-from tablerunner.bags.storage import Channel, Damage, Storage
+from tablerunner.bags.storage import Channel, Damage, Entry, Storage
 from tablerunner.errors import BagError
 
 _DECODE_ERRORS = (
@@ -55,16 +55,6 @@ class BagMessage(NamedTuple):
     message: Any
 
 
-class _Located(NamedTuple):
-    """An entry together with its file; sorts by time, then by order in the bag."""
-
-    stamp: int
-    file: int
-    order: int
-    channel: int
-    place: tuple[int, int, int]
-
-
 class BagReader:
     """A bag folder, or a single .mcap or .db3 file, opened for reading.
 
@@ -90,13 +80,9 @@ class BagReader:
         self._types: dict[tuple[str, str], TypeStore | None] = {}
         self._undecoded: dict[tuple[str, str], tuple[int, int, str]] = {}
         self._type_damage: list[Damage] = []
-        for file in self._folder.files:
-            self._open(file)
-        self._entries = sorted(
-            _Located(entry.stamp, number, entry.order, entry.channel, entry.place)
-            for number, storage in enumerate(self._storages)
-            for entry in storage.entries
-        )
+        for number, file in enumerate(self._folder.files):
+            self._open(file, number)
+        self._entries = sorted(entry for storage in self._storages for entry in storage.entries)
         self.topics = self._summarize()
 
     # -- what is in it ----------------------------------------------------------------------
@@ -125,12 +111,12 @@ class BagReader:
     @property
     def start(self) -> int:
         """Time of reception of the first message [ns]; 0 when there is none."""
-        return self._entries[0].stamp if self._entries else 0
+        return self._entries[0][0] if self._entries else 0
 
     @property
     def end(self) -> int:
         """Time of reception of the last message [ns]; 0 when there is none."""
-        return self._entries[-1].stamp if self._entries else 0
+        return self._entries[-1][0] if self._entries else 0
 
     def topic(self, name: str) -> TopicInfo | None:
         """Return what the bag holds of a topic, None when it does not hold it."""
@@ -151,7 +137,7 @@ class BagReader:
         for channel, entry in self._selected(topics):
             data = self._load(channel, entry)
             if data is not None:
-                yield RawMessage(channel.topic, entry.stamp, channel.msgtype, data)
+                yield RawMessage(channel.topic, entry[0], channel.msgtype, data)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
         """Yield deserialised messages, of some topics or of all; the others cost nothing."""
@@ -163,9 +149,9 @@ class BagReader:
             try:
                 message = store.deserialize_cdr(data, channel.msgtype)
             except _DECODE_ERRORS as error:
-                self.refuse(channel.topic, entry.stamp, str(error), entry.file)
+                self.refuse(channel.topic, entry[0], str(error), entry[1])
                 continue
-            yield BagMessage(channel.topic, entry.stamp, channel.msgtype, message)
+            yield BagMessage(channel.topic, entry[0], channel.msgtype, message)
 
     def refuse(self, topic: str, stamp: int, reason: str, file: int = 0) -> None:
         """Count a message as damaged: it decodes to something that its type does not allow."""
@@ -195,16 +181,16 @@ class BagReader:
 
     # -- inside -----------------------------------------------------------------------------
 
-    def _open(self, file: Path) -> None:
+    def _open(self, file: Path, number: int) -> None:
         readable = file
         try:
             if file.suffix == '.zstd':
                 readable = self._unpack(file)
             storage: Storage
             if readable.suffix == '.mcap':
-                storage = McapStorage(readable)
+                storage = McapStorage(readable, number)
             else:
-                storage = SqliteStorage(readable)
+                storage = SqliteStorage(readable, number)
         except OSError as error:
             raise BagError(f'{file} cannot be read: {error.strerror or error}') from error
         self._storages.append(storage)
@@ -219,7 +205,7 @@ class BagReader:
         unpacked.write_bytes(raw)
         return unpacked
 
-    def _selected(self, topics: Collection[str] | None) -> Iterator[tuple[Channel, _Located]]:
+    def _selected(self, topics: Collection[str] | None) -> Iterator[tuple[Channel, Entry]]:
         wanted = {
             (number, key): channel
             for number, storage in enumerate(self._storages)
@@ -227,16 +213,16 @@ class BagReader:
             if topics is None or channel.topic in topics
         }
         for entry in self._entries:
-            channel = wanted.get((entry.file, entry.channel))
+            channel = wanted.get((entry[1], entry[3]))
             if channel is not None:
                 yield channel, entry
 
-    def _load(self, channel: Channel, entry: _Located) -> bytes | None:
+    def _load(self, channel: Channel, entry: Entry) -> bytes | None:
         try:
-            data = self._storages[entry.file].load(entry.place)
+            data = self._storages[entry[1]].load(entry)
             return decompress_message(data) if self._folder.message_compression else data
         except (BagError, ValueError) as error:
-            self.refuse(channel.topic, entry.stamp, str(error), entry.file)
+            self.refuse(channel.topic, entry[0], str(error), entry[1])
             return None
 
     def _types_of(self, channel: Channel) -> TypeStore | None:
@@ -276,7 +262,7 @@ class BagReader:
     def _summarize(self) -> tuple[TopicInfo, ...]:
         counts: dict[tuple[int, int], int] = {}
         for entry in self._entries:
-            key = (entry.file, entry.channel)
+            key = (entry[1], entry[3])
             counts[key] = counts.get(key, 0) + 1
         found: dict[str, TopicInfo] = {}
         for number, storage in enumerate(self._storages):

@@ -16,6 +16,7 @@ from tablerunner.estimation import Localizer, LocalizerState, Outcome
 from tablerunner.evaluation.consistency import SourceSummary, summarize_innovations
 from tablerunner.evaluation.errors import ErrorSeries, compare
 from tablerunner.evaluation.truth import Stamps, Truth
+from tablerunner.messages.truth import TruePose
 from tablerunner.odometry import Odometer
 from tablerunner.types import (
     Anchor,
@@ -98,6 +99,8 @@ class ReplayResult:
         All ranges, calibrated.
     fixes : tuple of PoseSample
         UWB-only fixes; empty unless asked for.
+    first_stamp : int
+        Stamp of the first measurement [ns].
     start, end : int
         Times of reception of the first and last message of the bag [ns].
     damage : tuple of Damage
@@ -116,6 +119,7 @@ class ReplayResult:
     errors: ErrorSeries
     ranges: tuple[RangeSample, ...]
     fixes: tuple[PoseSample, ...]
+    first_stamp: int
     start: int
     end: int
     damage: tuple[Damage, ...] = ()
@@ -171,7 +175,7 @@ class _Log:
     trusted: list[bool] = field(default_factory=list)
     innovations: list[Innovation] = field(default_factory=list)
     refusals: Counter[tuple[str, str]] = field(default_factory=Counter)
-    truth: list[OdometrySample] = field(default_factory=list)
+    truth: list[TruePose] = field(default_factory=list)
     ranges: list[RangeSample] = field(default_factory=list)
     fixes: list[PoseSample] = field(default_factory=list)
 
@@ -194,6 +198,7 @@ class _Replay:
         self._localizer = Localizer(self._config.localizer)
         self._localizer.set_anchors(anchors)
         self._initialised: int | None = None
+        self._first_stamp = 0
 
     def _choose(self) -> tuple[str, ...]:
         def present(topic: str) -> bool:
@@ -230,10 +235,12 @@ class _Replay:
         if isinstance(record, Refusal):
             log.refusals[record.source, record.reason] += 1
             return
-        if isinstance(record, OdometrySample) and topic == 'ground_truth':
+        if isinstance(record, TruePose):
             log.truth.append(record)
             return
         stamp: int = record.stamp  # type: ignore[attr-defined]
+        if not self._first_stamp:
+            self._first_stamp = stamp
         if stamp > received + self._tolerance:
             log.refusals[topic, FUTURE] += 1
         elif isinstance(record, WheelSample):
@@ -297,7 +304,7 @@ class _Replay:
             np.array(log.covariances).reshape(count, 3, 3),
             np.array(log.trusted, dtype=bool),
         )
-        truth = Truth.from_odometry(log.truth)
+        truth = Truth.from_poses(log.truth)
         settled = estimates.settled()
         return ReplayResult(
             self._config.localizer.estimator,
@@ -312,6 +319,7 @@ class _Replay:
             compare(settled.stamps, settled.poses, truth, settled.covariances),
             tuple(log.ranges),
             tuple(log.fixes),
+            self._first_stamp,
             self._bag.start,
             self._bag.end,
             self._bag.damage,

@@ -17,8 +17,9 @@ _SUFFIXES = ('-journal', '-wal')
 class SqliteStorage:
     """One .db3 file; see `tablerunner.bags.storage.Storage`."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, number: int = 0) -> None:
         self.path = path
+        self._number = number
         self.channels: dict[int, Channel] = {}
         self.entries: list[Entry] = []
         self.damage: list[Damage] = []
@@ -47,14 +48,14 @@ class SqliteStorage:
             self._copy.cleanup()
             self._copy = None
 
-    def load(self, place: tuple[int, int, int]) -> bytes:
+    def load(self, entry: Entry) -> bytes:
         """Return the serialised message of a row; BagError when one of its pages is damaged."""
         assert self._connection is not None
         try:
             query = 'SELECT data FROM messages WHERE id = ?'
-            return bytes(self._connection.execute(query, (place[0],)).fetchone()[0])
+            return bytes(self._connection.execute(query, (entry[4],)).fetchone()[0])
         except (sqlite3.Error, TypeError) as error:
-            raise BagError(f'row {place[0]} cannot be read ({error})') from error
+            raise BagError(f'row {entry[4]} cannot be read ({error})') from error
 
     # -- opening ----------------------------------------------------------------------------
 
@@ -129,7 +130,9 @@ class SqliteStorage:
             elif topic not in self.channels:
                 strangers += 1
             else:
-                self.entries.append(Entry(stamp, len(self.entries), topic, (key, 0, 0)))
+                self.entries.append(
+                    (stamp, self._number, len(self.entries), topic, key, 0, 0)
+                )
         if strangers:
             self._note('', f'{strangers} messages belong to no topic', 'left out')
 

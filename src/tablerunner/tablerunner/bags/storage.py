@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Protocol, TypeAlias
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +46,10 @@ class Channel:
     qos: str = ''  # offered QoS profiles, YAML as in the bag
 
 
-class Entry(NamedTuple):
-    """Where one message is; entries sort by time, then by their order in the bag."""
-
-    stamp: int  # [ns] time of reception
-    order: int  # counts the messages of one file in the order they were written
-    channel: int
-    place: tuple[int, int, int]  # the storage's own
+Entry: TypeAlias = tuple[int, int, int, int, int, int, int]
+"""Where one message is, as a plain tuple since a bag has very many: time of reception [ns], number
+of the file in the bag, order in that file, channel, and three numbers of the storage's own.
+Entries sort by time, then by their order in the bag."""
 
 
 class Storage(Protocol):
@@ -64,8 +61,8 @@ class Storage(Protocol):
     damage: list[Damage]
     metadata: str  # text of the metadata.yaml that the file carries inside; may be empty
 
-    def load(self, place: tuple[int, int, int]) -> bytes:
-        """Return the serialised message at a place that an entry names."""
+    def load(self, entry: Entry) -> bytes:
+        """Return the serialised message of an entry; BagError when it cannot be read."""
 
     def close(self) -> None:
         """Let go of the file."""

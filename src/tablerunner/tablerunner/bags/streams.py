@@ -12,6 +12,7 @@ from tablerunner.messages.imu import imu_from_message, magnetic_from_message
 from tablerunner.messages.innovation import innovation_from_message
 from tablerunner.messages.odometry import odometry_from_message
 from tablerunner.messages.pose import pose_from_message
+from tablerunner.messages.truth import truth_from_message
 from tablerunner.messages.ultrasonic import ultrasonic_from_message
 from tablerunner.messages.uwb_range import range_from_message
 from tablerunner.messages.wheels import LEFT_JOINT, RIGHT_JOINT, wheels_from_message
@@ -25,7 +26,7 @@ class BagRecord(NamedTuple):
 
     topic: str  # relative name as in the contract
     received: int  # [ns] time of reception
-    record: Any  # record of tablerunner.types, tuple of Anchor, or Refusal
+    record: Any  # record of tablerunner.types, TruePose, tuple of Anchor, or Refusal
 
 
 def converters(
@@ -48,8 +49,9 @@ def converters(
         'imu/data': lambda message: imu_from_message(message, imu_heading),
         'imu/mag': lambda message: magnetic_from_message(message, imu_heading),
         'innovations': innovation_from_message,
+        'ground_truth': truth_from_message,
     }
-    for topic in ('odom', 'odometry/filtered', 'ground_truth'):
+    for topic in ('odom', 'odometry/filtered'):
         table[topic] = _odometry(topic)
     for topic in ('uwb/pose', 'camera/pose', 'pose', 'initialpose'):
         table[topic] = _pose(topic)

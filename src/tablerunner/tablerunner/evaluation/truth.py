@@ -9,13 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.geometry.pose import Pose2
-from tablerunner.types import (
-    UNKNOWN_YAW_VARIANCE,
-    Matrix,
-    OdometrySample,
-    Vector,
-    nanoseconds,
-)
+from tablerunner.types import Matrix, Vector, nanoseconds
 
 Stamps = NDArray[np.int64]
 
@@ -55,15 +49,6 @@ class Truth:
         finite = np.isfinite(headings)
         headings[finite] = np.unwrap(headings[finite])
         return cls(stamps, positions, headings)
-
-    @classmethod
-    def from_odometry(cls, samples: Iterable[OdometrySample]) -> Truth:
-        """Make it of messages of ground_truth; a heading variance beyond knowing means unknown."""
-        unknown = UNKNOWN_YAW_VARIANCE * (1.0 - 1e-9)
-        return cls.from_poses(
-            (item.stamp, item.pose, bool(item.pose_covariance[2, 2] < unknown))
-            for item in samples
-        )
 
     def __len__(self) -> int:
         """Return the number of poses."""

@@ -1,0 +1,153 @@
+"""Trips of bags: as the nodes published it, or as a replay found it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from tablerunner.bags.reader import BagReader
+from tablerunner.bags.replay import ReplayResult
+from tablerunner.bags.streams import bag_records, full_name
+from tablerunner.evaluation.trip import Halt, Trip
+from tablerunner.evaluation.truth import Truth
+from tablerunner.messages.truth import TruePose
+from tablerunner.types import (
+    Innovation,
+    OdometrySample,
+    PoseSample,
+    RangeSample,
+    nanoseconds,
+    seconds,
+)
+
+MOVING = 0.02
+"""Commands below this [m/s, rad/s] count as standing."""
+
+SHORTEST_HALT_S = 0.4
+"""Shorter interventions of the safety stop are not shown."""
+
+_JOINED_S = 1.0
+_TOPICS = (
+    'odometry/filtered', 'ground_truth', 'uwb/pose', 'uwb/ranges', 'uwb/anchors', 'innovations'
+)
+
+
+def trip_of_replay(result: ReplayResult, title: str) -> Trip:
+    """Return the trip as a replay found it."""
+    settled = result.estimates.settled()
+    return Trip(
+        title,
+        result.estimator,
+        settled.stamps,
+        settled.poses,
+        settled.covariances,
+        result.truth,
+        _positions(result.fixes),
+        np.array([fix.stamp for fix in result.fixes], dtype=np.int64),
+        result.ranges,
+        result.anchors,
+        result.innovations,
+    )
+
+
+def trip_of_bag(bag: BagReader, title: str, namespace: str = '') -> Trip | None:
+    """Return the trip as the nodes published it; None when the bag has no odometry/filtered."""
+    present = [topic for topic in _TOPICS if bag.topic(full_name(topic, namespace))]
+    if _TOPICS[0] not in present:
+        return None
+    poses: dict[int, OdometrySample] = {}
+    truth: list[TruePose] = []
+    fixes: list[PoseSample] = []
+    ranges: list[RangeSample] = []
+    innovations: list[Innovation] = []
+    anchors = ()
+    for _, _, record in bag_records(bag, present, namespace):
+        if isinstance(record, OdometrySample):
+            poses[record.stamp] = record
+        elif isinstance(record, TruePose):
+            truth.append(record)
+        elif isinstance(record, PoseSample):
+            fixes.append(record)
+        elif isinstance(record, RangeSample):
+            ranges.append(record)
+        elif isinstance(record, Innovation):
+            innovations.append(record)
+        elif isinstance(record, tuple):
+            anchors = record
+    stamps = np.array(sorted(poses), dtype=np.int64)
+    chosen = [poses[int(stamp)] for stamp in stamps]
+    trip = Trip(
+        title,
+        _estimator(bag, namespace),
+        stamps,
+        np.array([_row(item) for item in chosen]).reshape(-1, 3),
+        np.array([item.pose_covariance for item in chosen]).reshape(-1, 3, 3),
+        Truth.from_poses(truth),
+        _positions(fixes),
+        np.array([fix.stamp for fix in fixes], dtype=np.int64),
+        tuple(ranges),
+        anchors,
+        tuple(innovations),
+    )
+    return replace(trip, halts=_halts(bag, trip, namespace))
+
+
+
+def _row(item: OdometrySample) -> tuple[float, float, float]:
+    return item.pose.x, item.pose.y, item.pose.heading
+
+
+def _positions(fixes: Iterable[PoseSample]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.array([(fix.pose.x, fix.pose.y) for fix in fixes]).reshape(-1, 2)
+
+
+def _estimator(bag: BagReader, namespace: str) -> str:
+    """Return the name in the first message of innovations."""
+    for item in bag.messages([full_name('innovations', namespace)]):
+        return str(item.message.estimator)
+    return ''
+
+
+def _halts(bag: BagReader, trip: Trip, namespace: str) -> tuple[Halt, ...]:
+    """Find where the controller wanted to drive and the safety stop held the robot.
+
+    Commands have no stamp of their own, so that the time of reception stands in for it; the bag
+    must have been recorded on the same clock.
+    """
+    wanted_topic, given_topic = (
+        full_name(topic, namespace) for topic in ('cmd_vel_nav', 'cmd_vel')
+    )
+    wants = False
+    began: int | None = None
+    spans: list[tuple[int, int]] = []
+    last = 0
+    for topic, received, _, message in bag.messages([wanted_topic, given_topic]):
+        twist = message.twist if hasattr(message, 'twist') else message
+        moving = max(abs(twist.linear.x), abs(twist.angular.z)) > MOVING
+        if topic == wanted_topic:
+            wants = moving
+        held = wants and not moving if topic == given_topic else began is not None and wants
+        if held and began is None:
+            began = received
+        elif not held and began is not None:
+            spans.append((began, received))
+            began = None
+        last = received
+    if began is not None:
+        spans.append((began, last))
+    joined: list[tuple[int, int]] = []
+    for begin, end in spans:
+        if joined and begin - joined[-1][1] < nanoseconds(_JOINED_S):
+            joined[-1] = (joined[-1][0], end)
+        else:
+            joined.append((begin, end))
+    long = [span for span in joined if span[1] - span[0] >= nanoseconds(SHORTEST_HALT_S)]
+    places = trip.places(begin for begin, _ in long)
+    return tuple(
+        Halt(begin, seconds(end - begin), float(x), float(y))
+        for (begin, end), (x, y) in zip(long, places, strict=True)
+        if math.isfinite(x)
+    )

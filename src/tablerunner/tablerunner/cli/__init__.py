@@ -1,0 +1,1 @@
+"""The `tablerunner` command: what works without ROS, and what other packages add to it."""

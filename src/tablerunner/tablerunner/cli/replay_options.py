@@ -1,0 +1,63 @@
+"""What `replay` and `plot` have in common: settings from options, scenario and bag."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from tablerunner.bags.replay_config import ReplayConfig
+from tablerunner.errors import ConfigError
+from tablerunner.scenario import Scenario, load_scenario
+
+SCENARIO_FILE = 'scenario.yaml'
+
+
+def find_scenario(bag: Path, given: Path | None) -> Scenario | None:
+    """Return the scenario that was given, else the one that lies in or beside the bag."""
+    if given is not None:
+        return load_scenario(given)
+    folders = (bag, bag.parent) if bag.is_dir() else (bag.parent,)
+    for folder in folders:
+        if (folder / SCENARIO_FILE).is_file():
+            return load_scenario(folder / SCENARIO_FILE)
+    return None
+
+
+def replay_config(
+    scenario: Scenario | None, estimator: str, start: str, namespace: str
+) -> ReplayConfig:
+    """Return the settings of a replay.
+
+    Parameters
+    ----------
+    scenario : Scenario or None
+        Robot and anchors; None for the defaults and the bag's own anchors.
+    estimator : str
+        Name of the estimator.
+    start : str
+        ``X,Y,YAW`` in m and rad, or empty to find the start from the measurements.
+    namespace : str
+        Namespace of the robot in the bag.
+    """
+    config = ReplayConfig() if scenario is None else ReplayConfig.from_scenario(scenario)
+    try:
+        localizer = replace(
+            config.localizer, estimator=estimator, initial_pose=parse_start(start)
+        )
+    except ConfigError as error:
+        raise error.located('options') from None
+    return replace(config, localizer=localizer, namespace=namespace)
+
+
+def parse_start(text: str) -> tuple[float, ...]:
+    """Return the three numbers of ``X,Y,YAW``; nothing for an empty text."""
+    if not text.strip():
+        return ()
+    try:
+        numbers = tuple(float(part) for part in text.split(','))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 3 or not all(math.isfinite(number) for number in numbers):
+        raise ConfigError('--start', text, 'X,Y,YAW: three numbers in m, m and rad')
+    return numbers

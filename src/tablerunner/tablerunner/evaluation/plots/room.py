@@ -1,0 +1,99 @@
+"""The plan of a room: walls, furniture, anchors, the kitchen, where people walk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from tablerunner.evaluation.plots import style
+from tablerunner.scenario import Scenario
+from tablerunner.types import Anchor, Matrix
+
+_MARGIN_M = 0.6
+
+
+def draw_room(axes: Any, scenario: Scenario) -> None:
+    """Draw everything that stands in the room."""
+    from matplotlib.patches import Polygon
+
+    for outline in scenario.outlines:
+        if not outline.is_solid:
+            corners = outline.corners
+            if outline.closed:
+                corners = np.vstack([corners, corners[:1]])
+            axes.plot(*corners.T, color=style.WALL, lw=2.6, solid_capstyle='round', zorder=3)
+            continue
+        table = outline.kind == 'table'
+        axes.add_patch(
+            Polygon(
+                outline.corners,
+                closed=True,
+                fc=style.TABLE_FACE if table else style.BOX_FACE,
+                ec=style.TABLE_EDGE if table else style.BOX_EDGE,
+                lw=0.9,
+                zorder=1.5,
+            )
+        )
+        x, y = outline.corners.mean(axis=0)
+        label = outline.name.removeprefix('table_') if table else ''
+        axes.text(x, y, label, ha='center', va='center', color=style.TABLE_EDGE, zorder=1.6)
+    for person in scenario.people:
+        route = np.array(person.route)
+        if person.loop:
+            route = np.vstack([route, route[:1]])
+        axes.plot(*route.T, color='#C9C9C9', lw=0.9, ls=(0, (1, 2.5)), zorder=1.2)
+    kitchen = scenario.kitchen
+    if kitchen is not None:
+        axes.annotate(
+            kitchen.name,
+            (kitchen.stop_pose.x, kitchen.stop_pose.y),
+            xytext=(0, 15),
+            textcoords='offset points',
+            ha='center',
+            color=style.SUBDUED,
+            fontweight='bold',
+            zorder=6,
+        )
+
+
+def draw_anchors(axes: Any, anchors: Iterable[Anchor]) -> None:
+    """Draw the anchors, each with its name written towards the middle of the picture."""
+    places = list(anchors)
+    if not places:
+        return
+    middle = np.mean([anchor.position[:2] for anchor in places], axis=0)
+    for anchor in places:
+        x, y = anchor.position[:2]
+        axes.plot(
+            x, y, marker='^', ms=9, mfc=style.ANCHOR, mec='white', mew=0.8, zorder=7, clip_on=False
+        )
+        away = 1 if x < middle[0] else -1
+        axes.annotate(
+            anchor.anchor_id,
+            (x, y),
+            xytext=(9 * away, 0),
+            textcoords='offset points',
+            ha='left' if away > 0 else 'right',
+            va='center',
+            color=style.ANCHOR,
+            fontweight='bold',
+            zorder=7,
+        )
+
+
+def frame(axes: Any, scenario: Scenario | None, points: Matrix) -> None:
+    """Set the limits to the room and to all that is drawn, at equal scales."""
+    parts = [points[np.isfinite(points).all(axis=1)]]
+    if scenario is not None:
+        low_x, low_y, high_x, high_y = scenario.bounds
+        parts.append(np.array([[low_x, low_y], [high_x, high_y]]))
+    everything = np.concatenate(parts)
+    if not len(everything):
+        everything = np.zeros((1, 2))
+    low = everything.min(axis=0) - _MARGIN_M
+    high = everything.max(axis=0) + _MARGIN_M
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect('equal')
