@@ -1,0 +1,242 @@
+"""sim_bridge as a process of its own, over DDS."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseArray, Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState, MagneticField, Range
+from tf2_msgs.msg import TFMessage
+
+from tablerunner_interfaces.msg import UwbExchange
+from tablerunner_ros.testing.probe import Probe
+from tablerunner_ros.testing.process import Process, Processes
+
+ROOM = """\
+name: room
+walls:
+  - {name: hull, closed: true, points: [[0, 0], [10, 0], [10, 10], [0, 10]]}
+anchors:
+  - {id: A0, position: [0.1, 0.1, 2.25]}
+  - {id: A1, position: [9.9, 0.1, 2.25]}
+  - {id: A2, position: [9.9, 9.9, 2.25]}
+  - {id: A3, position: [0.1, 9.9, 2.25]}
+people:
+  - {name: guest, route: [[2.0, 8.0], [8.0, 8.0]]}
+start: [3.0, 5.0, 0.0]
+sensors:
+  uwb: {loss_probability: 0.0}
+"""
+NAMES = ('left', 'left_front', 'front', 'right_front', 'right')
+STREAMS: dict[str, tuple[type[Any], float]] = {
+    # topic: (type, messages per simulated second)
+    'clock': (Clock, 50.0),
+    'joint_states': (JointState, 50.0),
+    'ground_truth': (Odometry, 50.0),
+    'imu/data': (Imu, 100.0),
+    'imu/mag': (MagneticField, 20.0),
+    'uwb/exchanges': (UwbExchange, 40.0),
+    'people': (PoseArray, 10.0),
+    **{f'ultrasonic/{name}': (Range, 1.0 / 0.15) for name in NAMES},
+}
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    path = tmp_path / 'room.yaml'
+    path.write_text(ROOM, encoding='utf-8')
+    return path
+
+
+def start(processes: Processes, room: Path, **parameters: object) -> Process:
+    return processes.node('sim_bridge', 'sim_bridge', {'scenario': str(room), **parameters})
+
+
+def seconds(stamp: Time) -> float:
+    return stamp.sec + stamp.nanosec * 1e-9
+
+
+def stamps_of(messages: list[Any]) -> np.ndarray:
+    stamps = [m.clock if isinstance(m, Clock) else m.header.stamp for m in messages]
+    return np.array([seconds(stamp) for stamp in stamps])
+
+
+def test_node_topics_come_at_the_rates_of_the_contract(
+    probe: Probe, processes: Processes, room: Path
+) -> None:
+    """By the stamps, so in simulated time, however slow the machine is."""
+    heard = {topic: probe.listen(type_, topic) for topic, (type_, _) in STREAMS.items()}
+    start(processes, room)
+    probe.wait_for(lambda: len(heard['clock']) > 200, 'four simulated seconds')
+    for topic, (_, rate) in STREAMS.items():
+        stamps = stamps_of(heard[topic])
+        assert stamps[0] > 0.0
+        assert (np.diff(stamps) > 0).all(), topic
+        # The median: a slow machine may lose best-effort messages, which stretches the mean.
+        assert 1.0 / np.median(np.diff(stamps)) == pytest.approx(rate, rel=0.35), topic
+        lost = 1.0 - (len(stamps) - 1) / (rate * (stamps[-1] - stamps[0]))
+        assert -0.02 < lost < 0.1, topic
+    frames = {topic: heard[topic][0].header.frame_id for topic in STREAMS if topic != 'clock'}
+    assert frames['imu/data'] == frames['imu/mag'] == 'imu_link'
+    assert frames['uwb/exchanges'] == 'uwb_tag'
+    assert frames['ground_truth'] == frames['people'] == 'map'
+    for name in NAMES:
+        assert frames[f'ultrasonic/{name}'] == f'ultrasonic_{name}'
+
+
+def test_node_stamps_are_never_ahead_of_the_clock(
+    probe: Probe, processes: Processes, room: Path
+) -> None:
+    """Whoever hears a sample has been told that time before (topics may overtake on the way)."""
+    clock = probe.listen(Clock, 'clock')
+    truth = probe.listen(Odometry, 'ground_truth')
+    start(processes, room)
+    probe.wait_for(lambda: len(clock) > 100 and len(truth) > 90, 'two simulated seconds')
+    assert stamps_of(truth)[-1] <= stamps_of(clock)[-1] + 0.0201
+    told = set(np.round(stamps_of(clock), 6))
+    newest = np.round(stamps_of(truth)[20:80], 6)
+    assert told.issuperset(newest)
+
+
+def test_node_publishes_where_its_sensors_sit(
+    probe: Probe, processes: Processes, room: Path
+) -> None:
+    """Latched, so that who comes late hears it too; frames are parameters."""
+    start(processes, room, base_frame='robot', tag_frame='antenna')
+    probe.heard('clock')
+    frames = probe.listen(TFMessage, 'tf_static')
+    message = probe.wait_for(lambda: frames and frames[0], 'tf_static')
+    assert len(message.transforms) == 7
+    assert {item.header.frame_id for item in message.transforms} == {'robot'}
+    assert 'antenna' in {item.child_frame_id for item in message.transforms}
+
+
+def test_node_drives_and_stops_on_silence(probe: Probe, processes: Processes, room: Path) -> None:
+    """While commands come it drives; after the last, at most v 0.4 s + v^2/2a + v T further."""
+    truth = probe.listen(Odometry, 'ground_truth')
+    probe.speak(Twist, 'cmd_vel')
+    start(processes, room)
+    probe.connected('cmd_vel')
+    command = Twist()
+    command.linear.x = 0.5
+
+    def at_speed() -> bool:
+        probe.publish('cmd_vel', command)
+        return bool(truth) and truth[-1].twist.twist.linear.x > 0.45
+
+    probe.wait_for(at_speed, 'speed')
+    before = truth[-1].pose.pose.position.x
+    probe.wait_for(lambda: abs(truth[-1].twist.twist.linear.x) < 0.002, 'a stand')
+    after = truth[-1].pose.pose.position.x
+    # 0.05 m: what is under way between the probe's last command and the node's hearing it.
+    assert 0.1 < after - before < 0.5 * 0.4 + 0.5**2 / 2.4 + 0.5 * 0.08 + 0.05
+    probe.wait_diagnostic('sim_bridge', 'command stale', 'true')
+
+
+def test_node_refuses_bad_commands_with_a_reason(
+    probe: Probe, processes: Processes, room: Path
+) -> None:
+    start(processes, room)
+    bad = Twist()
+    bad.linear.x = math.nan
+    probe.speak(Twist, 'cmd_vel')
+    probe.connected('cmd_vel')
+    probe.publish('cmd_vel', bad)
+    probe.wait_diagnostic('sim_bridge: cmd_vel', 'refused', '1')
+
+
+def test_node_takes_stamped_commands_of_now_only(
+    probe: Probe, processes: Processes, room: Path
+) -> None:
+    """With cmd_vel_type twist_stamped a command from the past moves nothing."""
+    truth = probe.listen(Odometry, 'ground_truth')
+    start(processes, room, cmd_vel_type='twist_stamped')
+    probe.speak(TwistStamped, 'cmd_vel')
+    probe.connected('cmd_vel')
+    probe.wait_for(lambda: len(truth) > 50, 'a simulated second')
+    old = TwistStamped()
+    old.twist.linear.x = 0.5
+    old.header.stamp.nanosec = 1
+    probe.publish('cmd_vel', old)
+    probe.wait_diagnostic('sim_bridge: cmd_vel', 'refused: stamp is not of now', '1')
+    assert truth[-1].pose.pose.position.x == 3.0
+
+    def moves() -> bool:
+        command = TwistStamped()
+        command.twist.linear.x = 0.5
+        command.header.stamp = truth[-1].header.stamp
+        probe.publish('cmd_vel', command)
+        return truth[-1].pose.pose.position.x > 3.05
+
+    probe.wait_for(moves, 'the robot to move')
+
+
+def test_node_contact_is_heard_by_who_comes_late(
+    probe: Probe, processes: Processes, room: Path
+) -> None:
+    """A robot driven into the wall says so on contacts, latched, and on diagnostics."""
+    process = start(processes, room, start=[9.0, 5.0, 0.0], real_time_factor=4.0)
+    command = Twist()
+    command.linear.x = 0.5
+    probe.speak(Twist, 'cmd_vel')
+
+    def hit() -> bool:
+        probe.publish('cmd_vel', command)
+        return 'the robot hit hull' in process.output
+
+    probe.wait_for(hit, 'the wall')
+    contacts = probe.listen(DiagnosticStatus, 'contacts')
+    contact = probe.wait_for(lambda: contacts and contacts[0], 'the contact')
+    assert contact.level == DiagnosticStatus.ERROR
+    assert {item.key: item.value for item in contact.values}['kind'] == 'wall'
+    status = probe.wait_diagnostic('sim_bridge', 'contacts at fault', '1')
+    assert status.level == DiagnosticStatus.ERROR
+
+
+def test_node_time_runs_at_the_factor_and_ends_cleanly(
+    probe: Probe, processes: Processes, room: Path
+) -> None:
+    """Half speed is half speed; Ctrl-C ends the process with code 0."""
+    process = start(processes, room, real_time_factor=0.5)
+    clock = probe.listen(Clock, 'clock')
+    probe.wait_for(lambda: clock, 'the clock')
+    probe.wait_diagnostic(
+        'sim_bridge', 'real-time factor', lambda value: 0.4 < float(value) < 0.55
+    )
+    assert process.end() == 0
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'words'),
+    [
+        ({}, 'scenario: got'),
+        ({'scenario': 'nowhere.yaml'}, 'nowhere.yaml'),
+        ({'real_time_factor': 0.0}, 'real_time_factor'),
+        ({'start': [1.0, 2.0]}, 'start: got'),
+        ({'cmd_vel_type': 'joy'}, 'one of twist, twist_stamped'),
+    ],
+)
+def test_node_bad_parameters_end_it_with_two(
+    processes: Processes, room: Path, parameters: dict[str, object], words: str
+) -> None:
+    """One line says which parameter, what it was and what would do."""
+    given = {'scenario': str(room), **parameters} if parameters else {}
+    process = processes.node('sim_bridge', 'sim_bridge', given)
+    assert process.wait() == 2
+    assert words in process.output
+    assert 'Traceback' not in process.output
+
+
+def test_node_bad_scenario_names_file_and_line(processes: Processes, room: Path) -> None:
+    room.write_text(ROOM.replace('[9.9, 0.1, 2.25]', '[9.9, 0.1, high]'), encoding='utf-8')
+    process = processes.node('sim_bridge', 'sim_bridge', {'scenario': str(room)})
+    assert process.wait() == 2
+    assert f'{room}:6: anchors[1].position[2]: got' in process.output
