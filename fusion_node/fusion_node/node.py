@@ -165,8 +165,9 @@ class FusionNode(Node):
         estimate = outcome.estimate
         if estimate is None:
             return
-        if self._localizer.estimate is not None:
-            self._output.odometry(estimate, self._localizer.velocity(), self._twist_covariance)
+        # Also before the start is known: its covariance says so, and nav_controller needs it to
+        # find the heading by driving.
+        self._output.odometry(estimate, self._localizer.velocity(), self._twist_covariance)
         self._output.pose(estimate)
 
     def _count(self, outcome: Outcome, source: str, stamp: int) -> None:
