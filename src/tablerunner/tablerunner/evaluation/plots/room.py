@@ -9,9 +9,9 @@ import numpy as np
 
 from tablerunner.evaluation.plots import style
 from tablerunner.scenario import Scenario
-from tablerunner.types import Anchor, Matrix
+from tablerunner.types import Anchor, Matrix, Vector
 
-_MARGIN_M = 0.6
+_MARGIN = 0.03
 
 
 def draw_room(axes: Any, scenario: Scenario) -> None:
@@ -83,8 +83,16 @@ def draw_anchors(axes: Any, anchors: Iterable[Anchor]) -> None:
         )
 
 
-def frame(axes: Any, scenario: Scenario | None, points: Matrix) -> None:
-    """Set the limits to the room and to all that is drawn, at equal scales."""
+def extent(scenario: Scenario | None, points: Matrix) -> tuple[Vector, Vector]:
+    """Return the least and greatest x, y that hold the room and all points, with a margin.
+
+    Parameters
+    ----------
+    scenario : Scenario or None
+        The room.
+    points : ndarray, shape (n, 2)
+        Rows that are not finite are left out.
+    """
     parts = [points[np.isfinite(points).all(axis=1)]]
     if scenario is not None:
         low_x, low_y, high_x, high_y = scenario.bounds
@@ -92,8 +100,6 @@ def frame(axes: Any, scenario: Scenario | None, points: Matrix) -> None:
     everything = np.concatenate(parts)
     if not len(everything):
         everything = np.zeros((1, 2))
-    low = everything.min(axis=0) - _MARGIN_M
-    high = everything.max(axis=0) + _MARGIN_M
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect('equal')
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    margin = _MARGIN * max(float((high - low).max()), 1.0)
+    return low - margin, high + margin

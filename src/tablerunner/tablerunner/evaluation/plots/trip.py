@@ -11,18 +11,21 @@ import numpy as np
 from tablerunner.errors import ConfigError
 from tablerunner.evaluation.errors import ErrorSeries
 from tablerunner.evaluation.plots import style
-from tablerunner.evaluation.plots.room import draw_anchors, draw_room, frame
+from tablerunner.evaluation.plots.room import draw_anchors, draw_room, extent
 from tablerunner.evaluation.trip import Trip
 from tablerunner.evaluation.truth import Stamps
 from tablerunner.scenario import Scenario
-from tablerunner.types import Matrix, Vector, seconds
+from tablerunner.types import Anchor, LosState, Matrix, Vector, seconds
 
 ELLIPSE_SIGMAS = 2.0
 BAND_SIGMAS = 3.0
 
-_ELLIPSE_EVERY_M = 0.8
+_ELLIPSE_EVERY = 0.055  # of the picture's width
+_ARROW = 0.04  # the same
 _MOST_RAYS = 160
 _GAP_S = 0.6
+_WIDTH_IN, _LEFT_IN, _RIGHT_IN = 9.0, 0.7, 0.25
+_HEAD_IN, _BETWEEN_IN, _ERRORS_IN, _FOOT_IN = 1.15, 0.85, 1.7, 0.5
 
 
 def draw_trip(trip: Trip, scenario: Scenario | None, file: Path, dpi: int = 150) -> None:
@@ -54,14 +57,15 @@ def draw_trip(trip: Trip, scenario: Scenario | None, file: Path, dpi: int = 150)
     from matplotlib import pyplot as plt
 
     with mpl.rc_context(style.RC):
-        figure = plt.figure(figsize=(9.0, 12.4))
-        room, errors, sight = _layout(figure, trip)
+        anchors = trip.anchors or _anchors_of(scenario)
+        low, high = extent(scenario, _points(trip, anchors))
+        figure, (room, errors, sight) = _layout(plt, (high[1] - low[1]) / (high[0] - low[0]), trip)
+        room.set_xlim(low[0], high[0])
+        room.set_ylim(low[1], high[1])
         if scenario is not None:
             draw_room(room, scenario)
         _draw_plan(room, trip)
-        draw_anchors(room, trip.anchors or _anchors_of(scenario))
-        anchors = np.array([anchor.position[:2] for anchor in trip.anchors]).reshape(-1, 2)
-        frame(room, scenario, np.concatenate([trip.poses[:, :2], trip.truth.positions, anchors]))
+        draw_anchors(room, anchors)
         series = trip.errors()
         _head(figure, trip, series)
         _draw_errors(errors, trip, series)
@@ -76,28 +80,38 @@ def draw_trip(trip: Trip, scenario: Scenario | None, file: Path, dpi: int = 150)
             plt.close(figure)
 
 
-def _layout(figure: Any, trip: Trip) -> tuple[Any, Any, Any]:
-    rows = max(len(trip.anchors), 1)
-    grid = figure.add_gridspec(
-        3, 1, height_ratios=[8.2, 1.9, 0.16 * rows + 0.1], left=0.075, right=0.975, bottom=0.05,
-        top=0.925, hspace=0.17,
-    )
-    room = figure.add_subplot(grid[0])
-    errors = figure.add_subplot(grid[1])
-    sight = figure.add_subplot(grid[2], sharex=errors)
+def _layout(plt: Any, shape: float, trip: Trip) -> tuple[Any, tuple[Any, Any, Any]]:
+    """Make a figure whose room is as wide as all else; `shape` is its height over its width."""
+    wide = _WIDTH_IN - _LEFT_IN - _RIGHT_IN
+    room_high = wide * min(max(shape, 0.3), 1.6)
+    sight_high = 0.15 * max(len(trip.anchors), 1) + 0.05
+    high = _HEAD_IN + room_high + _BETWEEN_IN + _ERRORS_IN + 0.1 + sight_high + _FOOT_IN
+    figure = plt.figure(figsize=(_WIDTH_IN, high))
+
+    def axes(bottom: float, size: float) -> Any:
+        made = figure.add_axes(
+            (_LEFT_IN / _WIDTH_IN, bottom / high, wide / _WIDTH_IN, size / high)
+        )
+        made.tick_params(length=0)
+        return made
+
+    sight = axes(_FOOT_IN, sight_high)
+    errors = axes(_FOOT_IN + sight_high + 0.1, _ERRORS_IN)
+    room = axes(high - _HEAD_IN - room_high, room_high)
     room.set_xlabel('x [m]')
     room.set_ylabel('y [m]')
-    for axes in (room, errors, sight):
-        axes.tick_params(length=0)
+    room.set_aspect('equal')
+    errors.sharex(sight)
     errors.tick_params(labelbottom=False)
     errors.set_ylabel('position error [m]')
     errors.grid(axis='y', color=style.GRID, lw=0.8)
     sight.set_xlabel('time [s]')
-    return room, errors, sight
+    return figure, (room, errors, sight)
 
 
 def _head(figure: Any, trip: Trip, series: ErrorSeries) -> None:
-    figure.text(0.075, 0.972, trip.title, fontsize=15, fontweight='bold', va='center')
+    left, high = _LEFT_IN / _WIDTH_IN, figure.get_size_inches()[1]
+    figure.text(left, 1.0 - 0.32 / high, trip.title, fontsize=15, fontweight='bold', va='center')
     summary = series.summary()
     words = [f'{seconds(trip.end - trip.start):.0f} s']
     if trip.estimator:
@@ -107,7 +121,8 @@ def _head(figure: Any, trip: Trip, series: ErrorSeries) -> None:
             f'position error: RMSE {summary.rmse:.3f} m, mean {summary.mean:.3f} m, '
             f'max {summary.max:.3f} m, final {summary.final:.3f} m'
         )
-    figure.text(0.075, 0.95, '  ·  '.join(words), color=style.SUBDUED, va='center')
+    words_at = 1.0 - 0.62 / high
+    figure.text(left, words_at, '  ·  '.join(words), color=style.SUBDUED, va='center')
 
 
 def _draw_plan(axes: Any, trip: Trip) -> None:
@@ -143,8 +158,8 @@ def _draw_plan(axes: Any, trip: Trip) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         axes.legend(
-            handles, labels, loc='upper center', bbox_to_anchor=(0.5, 1.055),
-            ncols=len(handles), handlelength=1.8, columnspacing=1.6,
+            handles, labels, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=len(handles),
+            handlelength=1.7, columnspacing=1.5, borderpad=0.0, borderaxespad=0.6,
         )
 
 
@@ -171,7 +186,7 @@ def _draw_rays(axes: Any, trip: Trip) -> None:
 def _draw_ellipses(axes: Any, trip: Trip) -> None:
     from matplotlib.collections import EllipseCollection
 
-    rows = _spread(trip.poses[:, :2], _ELLIPSE_EVERY_M)
+    rows = _spread(trip.poses[:, :2], _ELLIPSE_EVERY * _width(axes))
     values, vectors = np.linalg.eigh(trip.covariances[rows, :2, :2])
     axes_m = 2.0 * ELLIPSE_SIGMAS * np.sqrt(np.clip(values, 0.0, None))
     turn = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
@@ -179,7 +194,7 @@ def _draw_ellipses(axes: Any, trip: Trip) -> None:
         EllipseCollection(
             axes_m[:, 1], axes_m[:, 0], turn, units='xy', offsets=trip.poses[rows, :2],
             offset_transform=axes.transData, facecolors=style.ESTIMATE, edgecolors=style.ESTIMATE,
-            linewidths=0.7, alpha=0.22, zorder=4.5,
+            linewidths=0.7, alpha=0.18, zorder=4.5,
         )
     )
     axes.plot(
@@ -189,6 +204,7 @@ def _draw_ellipses(axes: Any, trip: Trip) -> None:
 
 
 def _draw_ends(axes: Any, trip: Trip) -> None:
+    length = _ARROW * _width(axes)
     for row, face in ((0, 'white'), (-1, style.ESTIMATE)):
         x, y, heading = trip.poses[row]
         axes.plot(
@@ -196,7 +212,7 @@ def _draw_ends(axes: Any, trip: Trip) -> None:
         )
         axes.annotate(
             '',
-            (x + 0.55 * math.cos(heading), y + 0.55 * math.sin(heading)),
+            (x + length * math.cos(heading), y + length * math.sin(heading)),
             (x, y),
             arrowprops={'arrowstyle': '-|>', 'color': style.ESTIMATE, 'lw': 1.4, 'shrinkA': 4},
             zorder=6.4,
@@ -233,14 +249,27 @@ def _draw_sight(axes: Any, trip: Trip) -> None:
     ]
     if names:
         axes.eventplot(times, colors=style.NLOS, linewidths=0.8, linelengths=0.75)
+    if all(item.los is LosState.UNKNOWN for item in trip.ranges):
+        axes.text(0.5, 0.5, 'line of sight was not judged', ha='center', va='center',
+                  color=style.SUBDUED, transform=axes.transAxes)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.spines['left'].set_visible(False)
     axes.set_ylabel('no sight', labelpad=6)
 
 
-def _anchors_of(scenario: Scenario | None) -> list[Any]:
-    return [] if scenario is None else [place.anchor for place in scenario.anchors]
+def _anchors_of(scenario: Scenario | None) -> tuple[Anchor, ...]:
+    return () if scenario is None else tuple(place.anchor for place in scenario.anchors)
+
+
+def _points(trip: Trip, anchors: tuple[Anchor, ...]) -> Matrix:
+    places = np.array([anchor.position[:2] for anchor in anchors]).reshape(-1, 2)
+    return np.concatenate([trip.poses[:, :2], trip.truth.positions, places])
+
+
+def _width(axes: Any) -> float:
+    low, high = axes.get_xlim()
+    return float(high - low)
 
 
 def _since(trip: Trip, stamps: Stamps) -> Vector:
