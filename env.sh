@@ -15,7 +15,7 @@ else
 fi
 
 _tablerunner_open() {
-  if [ ! -f "$_tablerunner_root/install/.complete" ]; then
+  if [ ! -f "$_tablerunner_root/install/.way" ]; then
     echo "env.sh: nothing is built yet: run 'make setup' in $_tablerunner_root first." >&2
     return 1
   fi

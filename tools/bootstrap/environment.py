@@ -91,7 +91,7 @@ class Environment:
             elif line.startswith('Installing collected'):
                 progress.tell('unpacking')
             else:
-                progress.tell('')
+                progress.tell()
 
         only = ['--only-binary', ':all:']
         self._run([*pip, *only, '-r', str(builders)], environ, lock_fd, progress)
@@ -118,7 +118,7 @@ class Environment:
         progress: Progress,
         on_line: Callable[[str], None] | None = None,
     ) -> None:
-        follow = on_line or (lambda line: progress.tell(''))
+        follow = on_line or (lambda _: progress.tell())
         try:
             process.run(command, self.log, self.root, environ, follow, [lock_fd])
         except process.CommandError as error:

@@ -25,7 +25,7 @@ def run(
     log: Path,
     folder: Path,
     environ: Mapping[str, str],
-    on_line: Callable[[str], None] = lambda line: None,
+    on_line: Callable[[str], None] = lambda _: None,
     keep_open: Sequence[int] = (),
 ) -> None:
     """Run `command` in `folder`, append its output to `log`, pass each line to `on_line`.

@@ -20,6 +20,7 @@ class Progress:
         self._live = stream.isatty() and os.environ.get('TERM', 'dumb') != 'dumb'
         self._number = 0
         self._title = ''
+        self._detail = ''
         self._started = 0.0
         self._told = 0.0
 
@@ -27,14 +28,19 @@ class Progress:
         """Begin the next step."""
         self._number += 1
         self._title = title
+        self._detail = ''
         self._started = self._told = time.monotonic()
         if not self._live:
             self._say(f'[{self._number}/{self._total}] {title} ...\n')
         else:
-            self.tell('')
+            self.tell()
 
-    def tell(self, detail: str) -> None:
-        """Say how far the running step is; call it as often as you like."""
+    def tell(self, detail: str = '') -> None:
+        """Say how far the running step is, the same as before if nothing is given.
+
+        Call it as often as you like, to keep the clock going.
+        """
+        self._detail = detail = detail or self._detail
         now = time.monotonic()
         seconds = f'{now - self._started:.0f} s'
         words = f'{detail}, {seconds}' if detail else seconds

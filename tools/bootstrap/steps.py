@@ -89,7 +89,6 @@ def set_up(root: Path) -> None:
                 environ.update(wheels_environment(environment.folder, environ))
             workspace.build(
                 workspace.wanted(ground(), packages),
-                ground(),
                 packages,
                 colcon,
                 environ,

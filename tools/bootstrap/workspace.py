@@ -32,7 +32,6 @@ class Workspace:
         self.log = root / 'log' / 'setup' / 'colcon.log'
         self._build = root / 'build'
         self._stamp = self.install / '.complete'
-        self._ground_stamp = self._build / '.ground'
         self._unfinished = self._build / '.unfinished'
 
     def packages(self, prefixes: str) -> list[Path]:
@@ -55,57 +54,74 @@ class Workspace:
                 found.append(standin)
         return sorted(path.parent for path in found)
 
-    def wanted(self, ground: str, packages: list[Path]) -> str:
-        """Return the stamp that the build should have; `ground` is what it stands on."""
-        files = [self.root / 'colcon.meta']
-        words = [RECIPE, ground]
-        for package in packages:
-            words.append(str(package.relative_to(self.root)))
-            files += [package / name for name in _RECIPES if (package / name).is_file()]
-            for pattern in _INTERFACES:
-                files += package.glob(pattern)
-            for pattern in _SHARED:
-                words += sorted(str(path.relative_to(self.root)) for path in package.glob(pattern))
+    def wanted(self, ground: str, packages: list[Path]) -> dict[str, str]:
+        """Return the stamps that the build should have, by package, and what it stands on."""
+        return {'ground': f'{RECIPE} {ground}', **{p.name: self._stamp_of(p) for p in packages}}
+
+    def _stamp_of(self, package: Path) -> str:
+        files = [package / name for name in _RECIPES if (package / name).is_file()]
+        if package / 'CMakeLists.txt' in files:
+            files.append(self.root / 'colcon.meta')
+        for pattern in _INTERFACES:
+            files += package.glob(pattern)
+        words = [str(package.relative_to(self.root))]
+        for pattern in _SHARED:
+            words += sorted(str(path.relative_to(self.root)) for path in package.glob(pattern))
         return stamps.digest(words, files, self.root)
 
-    def is_current(self, wanted: str) -> bool:
-        """Say whether the last finished build was made from what is there now."""
-        return stamps.read(self._stamp) == wanted
+    def is_current(self, wanted: dict[str, str]) -> bool:
+        """Say whether everything was built from what is there now."""
+        return self._built() == wanted
+
+    def _built(self) -> dict[str, str]:
+        lines = stamps.read(self._stamp).splitlines()
+        return dict(line.split(' ', 1) for line in lines if ' ' in line)
+
+    def _write(self, built: dict[str, str]) -> None:
+        stamps.write(self._stamp, '\n'.join(f'{name} {built[name]}' for name in sorted(built)))
 
     def build(
         self,
-        wanted: str,
-        ground: str,
+        wanted: dict[str, str],
         packages: list[Path],
         colcon: list[str],
         environ: Mapping[str, str],
         progress: Progress,
         lock_fd: int,
     ) -> None:
-        """Build all packages, from nothing if the last build was cut off or on other ground."""
-        progress.start(f'colcon build of {len(packages)} packages')
-        if stamps.read(self._ground_stamp) != ground or self._unfinished.exists():
+        """Build what changed; everything, from nothing, if the last build was cut off."""
+        built = self._built()
+        if built.get('ground') != wanted['ground'] or self._unfinished.exists():
+            built = {}
             for folder in (self._build, self.install):
                 shutil.rmtree(folder, ignore_errors=True)
-        self._stamp.unlink(missing_ok=True)
         self._drop_stale({package.name for package in packages})
-        stamps.write(self._ground_stamp, ground)
-        self._unfinished.touch()
+        kept = {name: stamp for name, stamp in built.items() if wanted.get(name) == stamp}
+        changed = [package for package in packages if package.name not in kept]
+        count = 'one package' if len(changed) == 1 else f'{len(changed)} packages'
+        progress.start(f'colcon build of {count}')
+        self._write(kept)
+        # env.sh reads which of the two ways this is: on ROS as installed, or on its wheels.
+        stamps.write(self.install / '.way', wanted['ground'].split()[1])
+        stamps.write(self._unfinished, 'removed when colcon has ended')
         self.log.unlink(missing_ok=True)
         standins = [package for package in packages if 'standins' in package.parts]
         command = [*colcon, '--log-base', 'log', 'build', '--symlink-install']
         command += ['--event-handlers', 'console_direct-', 'console_cohesion-']
         command += ['--base-paths', '.', *(str(p.relative_to(self.root)) for p in standins)]
+        if kept:
+            command += ['--packages-select', *(package.name for package in changed)]
         done = 0
 
         def on_line(line: str) -> None:
             nonlocal done
             match = re.match(r'Finished <<< (\S+)', line)
             done += match is not None
-            progress.tell(f'{done} of {len(packages)}')
+            progress.tell(f'{done} of {len(changed)}')
 
         try:
-            process.run(command, self.log, self.root, environ, on_line, [lock_fd])
+            if changed:
+                process.run(command, self.log, self.root, environ, on_line, [lock_fd])
         except process.CommandError as error:
             self._unfinished.unlink(missing_ok=True)
             text = '\n'.join('    ' + line for line in process.tail(error.log).splitlines())
@@ -115,9 +131,7 @@ class Workspace:
                 raise SetupError(text) from None
             raise SetupError(f'Building the packages failed, {shown} ends with:\n{text}') from None
         self._unfinished.unlink(missing_ok=True)
-        # env.sh reads which of the two ways this is: on ROS as installed, or on its wheels.
-        stamps.write(self.install / '.way', ground.split()[0])
-        stamps.write(self._stamp, wanted)
+        self._write(wanted)
         progress.done()
 
     def _drop_stale(self, names: set[str]) -> None:

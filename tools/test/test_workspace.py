@@ -14,6 +14,7 @@ def root(tmp_path: Path) -> Path:
     for folder in ('uwb_driver', 'src/messages', 'tools/standins/tf2_msgs'):
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / 'package.xml').write_text(f'<name>{folder}</name>')
+    (tmp_path / 'src/messages/CMakeLists.txt').touch()
     (tmp_path / 'src/messages/msg').mkdir()
     (tmp_path / 'src/messages/msg/A.msg').write_text('int32 a')
     (tmp_path / 'uwb_driver/params').mkdir()
@@ -25,7 +26,7 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def wanted(root: Path, ground: str = 'wheels x') -> str:
+def wanted(root: Path, ground: str = 'wheels x') -> dict[str, str]:
     workspace = Workspace(root)
     return workspace.wanted(ground, workspace.packages(''))
 
@@ -47,6 +48,13 @@ def test_wanted_changes_with_what_is_built_from(root: Path, name: str) -> None:
     before = wanted(root)
     (root / name).write_text('changed')
     assert wanted(root) != before
+
+
+def test_wanted_changes_only_for_the_package_that_changed(root: Path) -> None:
+    before = wanted(root)
+    (root / 'uwb_driver/setup.py').touch()
+    after = wanted(root)
+    assert {name for name in after if after[name] != before[name]} == {'uwb_driver'}
 
 
 def test_wanted_changes_with_ground_and_with_new_shared_files(root: Path) -> None:
