@@ -12,10 +12,12 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseArray, Twist, TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState, MagneticField, Range
 from tf2_msgs.msg import TFMessage
 
+from sim_bridge.node import SimBridge
 from tablerunner_interfaces.msg import UwbExchange
 from tablerunner_ros.testing.probe import Probe
 from tablerunner_ros.testing.process import Process, Processes
@@ -75,15 +77,20 @@ def test_node_topics_come_at_the_rates_of_the_contract(
     """By the stamps, so in simulated time, however slow the machine is."""
     heard = {topic: probe.listen(type_, topic) for topic, (type_, _) in STREAMS.items()}
     start(processes, room)
-    probe.wait_for(lambda: len(heard['clock']) > 200, 'four simulated seconds')
+    probe.wait_for(lambda: len(heard['ground_truth']) > 200, 'four simulated seconds')
     for topic, (_, rate) in STREAMS.items():
         stamps = stamps_of(heard[topic])
+        steps = np.diff(stamps)
         assert stamps[0] > 0.0
-        assert (np.diff(stamps) > 0).all(), topic
-        # The median: a slow machine may lose best-effort messages, which stretches the mean.
-        assert 1.0 / np.median(np.diff(stamps)) == pytest.approx(rate, rel=0.35), topic
+        assert (steps > 0).all(), topic
+        if topic == 'clock':
+            # Its queue holds one message, by contract: a busy listener hears only some.
+            assert steps.min() == pytest.approx(1.0 / rate), topic
+            continue
+        # The median: a busy machine may lose best-effort messages, which stretches the mean.
+        assert 1.0 / np.median(steps) == pytest.approx(rate, rel=0.35), topic
         lost = 1.0 - (len(stamps) - 1) / (rate * (stamps[-1] - stamps[0]))
-        assert -0.02 < lost < 0.1, topic
+        assert -0.02 < lost < 0.2, topic
     frames = {topic: heard[topic][0].header.frame_id for topic in STREAMS if topic != 'clock'}
     assert frames['imu/data'] == frames['imu/mag'] == 'imu_link'
     assert frames['uwb/exchanges'] == 'uwb_tag'
@@ -92,18 +99,32 @@ def test_node_topics_come_at_the_rates_of_the_contract(
         assert frames[f'ultrasonic/{name}'] == f'ultrasonic_{name}'
 
 
-def test_node_stamps_are_never_ahead_of_the_clock(
-    probe: Probe, processes: Processes, room: Path
+def test_node_tells_the_time_before_what_was_measured_then(
+    probe: Probe, room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever hears a sample has been told that time before (topics may overtake on the way)."""
-    clock = probe.listen(Clock, 'clock')
-    truth = probe.listen(Odometry, 'ground_truth')
-    start(processes, room)
-    probe.wait_for(lambda: len(clock) > 100 and len(truth) > 90, 'two simulated seconds')
-    assert stamps_of(truth)[-1] <= stamps_of(clock)[-1] + 0.0201
-    told = set(np.round(stamps_of(clock), 6))
-    newest = np.round(stamps_of(truth)[20:80], 6)
-    assert told.issuperset(newest)
+    """In each tick the clock goes out first, and no sample is stamped ahead of it."""
+    sent: list[int | str] = []
+
+    class Recorder:
+        def __init__(self, *_: object) -> None:
+            pass
+
+        def publish_clock(self, now_ns: int) -> None:
+            sent.append(now_ns)
+
+        def publish_samples(self, samples: tuple[Any, ...]) -> None:
+            assert samples
+            assert all(sent[-1] - 20_000_000 < sample.stamp <= sent[-1] for sample in samples)
+
+        def publish_people(self, now_ns: int, people: tuple[Any, ...]) -> None:
+            assert sent[-1] == now_ns
+            assert len(people) == 1
+
+    monkeypatch.setattr('sim_bridge.node.Outlets', Recorder)
+    node = probe.host(SimBridge, parameter_overrides=[Parameter('scenario', value=str(room))])
+    for _ in range(100):
+        node._tick()
+    assert np.diff(sent) == pytest.approx(20_000_000)
 
 
 def test_node_publishes_where_its_sensors_sit(
@@ -136,8 +157,8 @@ def test_node_drives_and_stops_on_silence(probe: Probe, processes: Processes, ro
     before = truth[-1].pose.pose.position.x
     probe.wait_for(lambda: abs(truth[-1].twist.twist.linear.x) < 0.002, 'a stand')
     after = truth[-1].pose.pose.position.x
-    # 0.05 m: what is under way between the probe's last command and the node's hearing it.
-    assert 0.1 < after - before < 0.5 * 0.4 + 0.5**2 / 2.4 + 0.5 * 0.08 + 0.05
+    # 0.2 m: the probe's truth is late on a busy machine; exact distances are tested in the core.
+    assert 0.1 < after - before < 0.5 * 0.4 + 0.5**2 / 2.4 + 0.5 * 0.08 + 0.2
     probe.wait_diagnostic('sim_bridge', 'command stale', 'true')
 
 
@@ -214,29 +235,27 @@ def test_node_time_runs_at_the_factor_and_ends_cleanly(
     assert process.end() == 0
 
 
-@pytest.mark.parametrize(
-    ('parameters', 'words'),
-    [
-        ({}, 'scenario: got'),
-        ({'scenario': 'nowhere.yaml'}, 'nowhere.yaml'),
-        ({'real_time_factor': 0.0}, 'real_time_factor'),
-        ({'start': [1.0, 2.0]}, 'start: got'),
-        ({'cmd_vel_type': 'joy'}, 'one of twist, twist_stamped'),
-    ],
-)
-def test_node_bad_parameters_end_it_with_two(
-    processes: Processes, room: Path, parameters: dict[str, object], words: str
-) -> None:
-    """One line says which parameter, what it was and what would do."""
-    given = {'scenario': str(room), **parameters} if parameters else {}
-    process = processes.node('sim_bridge', 'sim_bridge', given)
-    assert process.wait() == 2
-    assert words in process.output
-    assert 'Traceback' not in process.output
+BAD = {
+    'scenario: got': None,
+    'nowhere.yaml': {'scenario': 'nowhere.yaml'},
+    'real_time_factor': {'real_time_factor': 0.0},
+    'start: got': {'start': [1.0, 2.0]},
+    'one of twist, twist_stamped': {'cmd_vel_type': 'joy'},
+    'bad.yaml:6: anchors[1].position[2]: got': {'scenario': 'bad.yaml'},
+}
 
 
-def test_node_bad_scenario_names_file_and_line(processes: Processes, room: Path) -> None:
-    room.write_text(ROOM.replace('[9.9, 0.1, 2.25]', '[9.9, 0.1, high]'), encoding='utf-8')
-    process = processes.node('sim_bridge', 'sim_bridge', {'scenario': str(room)})
-    assert process.wait() == 2
-    assert f'{room}:6: anchors[1].position[2]: got' in process.output
+def test_node_bad_parameters_end_it_with_two(processes: Processes, room: Path) -> None:
+    """One line says which parameter or line of the scenario, what it was and what would do."""
+    bad = room.with_name('bad.yaml')
+    bad.write_text(ROOM.replace('[9.9, 0.1, 2.25]', '[9.9, 0.1, high]'), encoding='utf-8')
+    started = {}
+    for words, wrong in BAD.items():
+        given = {} if wrong is None else {'scenario': str(room), **wrong}
+        if given.get('scenario') == bad.name:
+            given['scenario'] = str(bad)
+        started[words] = processes.node('sim_bridge', 'sim_bridge', given)
+    for words, process in started.items():
+        assert process.wait() == 2
+        assert words in process.output
+        assert 'Traceback' not in process.output
