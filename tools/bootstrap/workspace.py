@@ -95,9 +95,12 @@ class Workspace:
             built = {}
             for folder in (self._build, self.install):
                 shutil.rmtree(folder, ignore_errors=True)
-        self._drop_stale({package.name for package in packages})
         kept = {name: stamp for name, stamp in built.items() if wanted.get(name) == stamp}
         changed = [package for package in packages if package.name not in kept]
+        # colcon leaves what a package no longer installs, and stumbles over links to files that
+        # are gone. Packages of messages take long and have no links: they are built as they are.
+        messages = {package.name for package in packages if (package / 'CMakeLists.txt').exists()}
+        self._drop_all_but(messages | set(kept))
         count = 'one package' if len(changed) == 1 else f'{len(changed)} packages'
         progress.start(f'colcon build of {count}')
         self._write(kept)
@@ -134,8 +137,8 @@ class Workspace:
         self._write(wanted)
         progress.done()
 
-    def _drop_stale(self, names: set[str]) -> None:
-        """Remove what was installed from a package that is no longer there."""
+    def _drop_all_but(self, names: set[str]) -> None:
+        """Remove what was built and installed from other packages."""
         for prefix in self.install.glob('*/'):
             if prefix.is_dir() and prefix.name not in names:
                 shutil.rmtree(prefix, ignore_errors=True)
