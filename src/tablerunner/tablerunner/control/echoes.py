@@ -8,7 +8,7 @@ until it fires again, and a little longer because echoes drop out.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from tablerunner.types import NANOSECONDS, Refusal, UltrasonicSample, Vector, Ve
 _ARC_POINTS = 7
 _FUTURE_S = 0.1  # clocks of two machines may differ by this
 _CLOSING_M_S = 0.25  # several times what the noise of two readings makes of a thing at rest
+_WALKING_M_S = 2.5  # faster than anybody walks in a room: another thing than before
+_NOISE_M = 0.02
 _COMPARE_S = 0.5  # readings farther apart are not compared
 _SIDE_RAD = math.radians(60.0)
 
@@ -29,6 +31,8 @@ class _Echo:
     stamp: int
     sensor: str
     points: Vector  # (_ARC_POINTS, 2) in base_link, from right to left; empty: nothing was there
+    nearing: bool  # it seemed to come nearer by itself
+    confirmed: bool  # the reading before heard the same thing
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +47,8 @@ class Heard:
         Since they were heard [s].
     closing : ndarray of bool, shape (n,)
         Whether it came nearer by itself, or has only just appeared.
+    nearing : ndarray of bool, shape (n,)
+        Whether it was measured to come nearer by itself, at walking pace.
     beside : ndarray of bool, shape (n,)
         Whether a sensor heard it that looks to the side.
     sensors : tuple of str
@@ -51,6 +57,7 @@ class Heard:
     points: Vector
     ages_s: Vector
     closing: NDArray[np.bool_]
+    nearing: NDArray[np.bool_]
     beside: NDArray[np.bool_]
     sensors: tuple[str, ...]
 
@@ -81,9 +88,11 @@ class EchoMemory:
             for name, mount in mounts.items()
         }
         self.configure(hold_s, hold_near_s, near_m)
+        self._motion = Velocity()
         self._echoes: list[_Echo] = []
         self._last: dict[str, _Echo] = {}
         self._closing_until: dict[str, int] = {}
+        self._nearing_until: dict[str, int] = {}
 
     def configure(self, hold_s: float, hold_near_s: float, near_m: float) -> None:
         """Use other times from now on."""
@@ -101,9 +110,17 @@ class EchoMemory:
             return Refusal(sample.stamp, f'ultrasonic/{sample.sensor}', sample.sensor, reason)
         # The echoes at hand are in the frame of now; at walking pace the few milliseconds between
         # firing and arrival do not matter, and the age is charged to whoever approaches.
-        echo = _Echo(sample.stamp, sample.sensor, self._arc(sample))
-        if self._is_closing(echo):
+        points = self._arc(sample)
+        speed = self._closing_m_s(sample, points)
+        closing = speed > _CLOSING_M_S
+        nearing = closing and speed < math.inf
+        last = self._last.get(sample.sensor)
+        # Twice in a row: one step nearer may be the edge of another thing.
+        if nearing and last is not None and last.nearing:
+            self._nearing_until[sample.sensor] = sample.stamp + NANOSECONDS // 2
+        if closing:
             self._closing_until[sample.sensor] = sample.stamp + NANOSECONDS
+        echo = _Echo(sample.stamp, sample.sensor, points, nearing, 0.0 <= speed < math.inf)
         self._echoes.append(echo)
         self._last[sample.sensor] = echo
         return None
@@ -137,32 +154,43 @@ class EchoMemory:
         local = distance * np.column_stack([np.cos(angles), np.sin(angles)])
         return self.mounts[sample.sensor].transform(local)
 
-    def _is_closing(self, echo: _Echo) -> bool:
-        """Return whether what is heard now came nearer than the robot's motion explains."""
-        if not len(echo.points):
-            return False
-        last = self._last.get(echo.sensor)
+    def _closing_m_s(self, sample: UltrasonicSample, points: Vector) -> float:
+        """Return how fast what is heard comes nearer beyond the robot's own motion [m/s].
+
+        inf: nothing was heard there before, or another thing; -inf: nothing is heard.
+        """
+        if not len(points):
+            return -math.inf
+        last = self._last.get(sample.sensor)
         if last is None or not len(last.points):
-            return True
-        apart_s = seconds(echo.stamp - last.stamp)
+            return math.inf
+        apart_s = seconds(sample.stamp - last.stamp)
         if apart_s > _COMPARE_S:
-            return True
-        mount = self.mounts[echo.sensor]
+            return math.inf
+        mount = self.mounts[sample.sensor]
         place = np.array([mount.x, mount.y])
-        now_m = float(np.linalg.norm(echo.points[0] - place))
+        now_m = float(np.linalg.norm(points[0] - place))
         # The nearest point of the old arc: where in the cone the echo came from is not known.
         before_m = float(np.min(np.linalg.norm(last.points - place, axis=1)))
-        return before_m - now_m > _CLOSING_M_S * apart_s + 0.02
+        speed = (before_m - now_m - _NOISE_M) / apart_s
+        if speed > _WALKING_M_S:
+            return math.inf
+        # A thing at rest that stands at a slant to the way seems to come nearer, too: at 45
+        # degrees as fast as the robot passes it.
+        passing = abs(self._motion.linear_m_s * math.sin(mount.heading))
+        sweeping = abs(self._motion.angular_rad_s) * before_m
+        return max(speed - passing - sweeping, 0.0)
 
     def move(self, motion: Velocity, dt: float) -> None:
         """Carry the echoes along while the robot drives with `motion` for `dt` [s]."""
+        self._motion = motion
         if dt <= 0.0 or not self._echoes:
             return
         turn = motion.angular_rad_s * dt
         step = motion.linear_m_s * dt
         moved = Pose2(step * math.cos(turn / 2), step * math.sin(turn / 2), turn).inverse()
         self._echoes = [
-            _Echo(echo.stamp, echo.sensor, moved.transform(echo.points)) for echo in self._echoes
+            replace(echo, points=moved.transform(echo.points)) for echo in self._echoes
         ]
         for echo in self._echoes:
             if echo.stamp == self._last[echo.sensor].stamp:
@@ -178,8 +206,8 @@ class EchoMemory:
         if not len(echo.points):
             return False
         age_s = seconds(now - echo.stamp)
-        if age_s <= self._hold_s:
-            return True
+        if age_s <= self._hold_s or not echo.confirmed:
+            return age_s <= self._hold_s
         middle = echo.points[len(echo.points) // 2]
         return age_s <= self._hold_near_s and float(np.hypot(*middle)) <= self._near_m
 
@@ -195,11 +223,22 @@ class EchoMemory:
             return None
         count = [len(echo.points) for echo in kept]
         ages = [max(seconds(now - echo.stamp), 0.0) for echo in kept]
-        closing = [self._closing_until.get(echo.sensor, 0) > now for echo in kept]
+        # An older echo that is still held is taken for a thing at rest: the newer reading tells
+        # of what moves.
+        newest = [echo.stamp == self._last[echo.sensor].stamp for echo in kept]
+        closing = [
+            new and self._closing_until.get(echo.sensor, 0) > now
+            for new, echo in zip(newest, kept, strict=True)
+        ]
+        nearing = [
+            new and self._nearing_until.get(echo.sensor, 0) > now
+            for new, echo in zip(newest, kept, strict=True)
+        ]
         return Heard(
             np.concatenate([echo.points for echo in kept]),
             np.repeat(ages, count),
             np.repeat(closing, count),
+            np.repeat(nearing, count),
             np.repeat([self._beside[echo.sensor] for echo in kept], count),
             tuple(echo.sensor for echo in kept for _ in range(len(echo.points))),
         )
@@ -209,3 +248,4 @@ class EchoMemory:
         self._echoes = []
         self._last = {}
         self._closing_until = {}
+        self._nearing_until = {}

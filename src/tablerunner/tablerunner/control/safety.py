@@ -222,7 +222,7 @@ class SafetyStop:
                 top = min(top, config.restart_speed)
             if top < wanted.linear_m_s:
                 blocked = True
-                reasons.append(f'obstacle: {sensor}' if sensor else 'way not yet clear again')
+                reasons.append(f'obstacle: {sensor}' if sensor else 'starting again after a stop')
         else:
             self._hold(now, math.inf)
         uncertain = config.require_pose and not (
@@ -293,12 +293,15 @@ class SafetyStop:
         if heard is None:
             return math.inf, math.inf, None, ''
         ways = self._free_ways(heard.points, wanted) - config.margin
+        gaps = np.linalg.norm(heard.points, axis=1) - config.footprint_radius
+        # Who comes nearer from ahead may step into the way from beside it.
+        ahead = heard.nearing & (heard.points[:, 0] > 0.0)
+        ways = np.where(ahead, np.minimum(ways, gaps - config.margin), ways)
         # Who walks towards the robot goes on walking, also while the echo grows old.
         approach = np.where(heard.closing, config.approach_speed, 0.0)
         speeds = largest_speed(
             ways - approach * heard.ages_s, config.delay, config.deceleration, approach
         )
-        gaps = np.linalg.norm(heard.points, axis=1) - config.footprint_radius
         beside = largest_speed(
             gaps * _SLANT - config.side_margin, config.delay, config.deceleration
         )

@@ -137,14 +137,14 @@ class SafetyConfig(Config):
         dynamic=True,
     )
     restart_speed: float = parameter(
-        0.2,
+        0.12,
         description='Largest speed after a stop for something in the way',
         unit='m/s',
         above=0.0,
         dynamic=True,
     )
     restart_distance: float = parameter(
-        0.25,
+        0.4,
         description='Way after a stop up to which that counts',
         unit='m',
         low=0.0,
