@@ -18,11 +18,6 @@ words = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=
 unknown = st.just(math.nan)
 
 
-def single(value: float) -> float:
-    """Return a number as a float32 field keeps it."""
-    return float(np.float32(value))
-
-
 def poses() -> st.SearchStrategy[Pose2]:
     """Return poses in the plane."""
     return st.builds(Pose2, lengths, lengths, headings)
