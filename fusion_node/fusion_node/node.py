@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -13,7 +12,7 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 
 from fusion_node.output import EstimateOutput
-from tablerunner.config import Config, parameter
+from fusion_node.params import FusionNodeConfig
 from tablerunner.estimation import Localizer, LocalizerConfig, LocalizerState, Outcome
 from tablerunner.types import Refusal
 from tablerunner_interfaces.msg import Innovation as InnovationMessage
@@ -39,39 +38,12 @@ _LEVELS = {
 }
 
 
-@dataclass(frozen=True)
-class FusionNodeConfig(Config):
-    """Frames, which poses are used, and how soon silence is an error."""
-
-    map_frame: str = parameter('map', description='Frame of anchors and of the estimate')
-    odom_frame: str = parameter('odom', description='Frame of the odometry')
-    base_frame: str = parameter('base_link', description='Frame of the robot')
-    publish_tf: bool = parameter(
-        True, description='Whether the transform map to odom is published'
-    )
-    pose_sources: tuple[str, ...] = parameter(
-        ('camera/pose',),
-        description=(
-            'Topics of poses that are fused: camera/pose, uwb/pose. The fix of uwb/pose holds '
-            'nothing that uwb/ranges does not hold: use one of the two'
-        ),
-    )
-    use_ranges: bool = parameter(True, description='Whether uwb/ranges is fused')
-    silence: float = parameter(
-        1.0,
-        unit='s',
-        description='Silence of odometry or ranges after which diagnostics report it',
-        above=0.0,
-        high=60.0,
-    )
-
-
 class FusionNode(Node):
     """Hands every measurement to the localiser and publishes what it then believes.
 
     odometry/filtered leaves first, since the robot drives by it; the rest follows. Before the
-    start is known there is neither odometry/filtered nor map to odom, and pose carries the
-    variance of a heading that is not known.
+    start is known there is no map to odom, and pose and odometry/filtered carry the variance of a
+    heading that is not known.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -165,8 +137,8 @@ class FusionNode(Node):
         estimate = outcome.estimate
         if estimate is None:
             return
-        # Also before the start is known: its covariance says so, and nav_controller needs it to
-        # find the heading by driving.
+        # Also before the start is known: the covariance says so, and nav_controller needs both
+        # to find the heading by driving.
         self._output.odometry(estimate, self._localizer.velocity(), self._twist_covariance)
         self._output.pose(estimate)
 

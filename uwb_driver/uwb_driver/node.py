@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.node import Node
 
-from tablerunner.config import Config, parameter
 from tablerunner.types import RangeSample, Refusal
 from tablerunner.uwb import Positioner, PositionerConfig, Ranger, RangerConfig
 from tablerunner_interfaces.msg import UwbAnchorArray, UwbExchange, UwbRange
@@ -22,23 +20,9 @@ from tablerunner_ros.parameters import declare_config
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.spin import spin_node
 from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
+from uwb_driver.params import UwbDriverConfig
 
 EXCHANGES = 'uwb/exchanges'
-
-
-@dataclass(frozen=True)
-class UwbDriverConfig(Config):
-    """Frames of the node and how soon silence is an error."""
-
-    map_frame: str = parameter('map', description='Frame of the anchors and of the fix')
-    tag_frame: str = parameter('uwb_tag', description="Frame of the tag's antenna")
-    silence: float = parameter(
-        1.0,
-        unit='s',
-        description='Silence of an anchor, or of all, after which diagnostics report it',
-        above=0.0,
-        high=60.0,
-    )
 
 
 class UwbDriver(Node):
