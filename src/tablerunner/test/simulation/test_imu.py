@@ -78,8 +78,8 @@ def test_imu_bias_walks_with_the_root_of_time(still_drive: Drive) -> None:
     for seed in range(300):
         imu = Imu(RobotGeometry(), errors, still_drive, np.random.default_rng(seed))
         first.append(imu.gyro_bias_rad_s)
-        for second in range(1, 5):
-            imu.read(second * 1_000_000_000, still_drive, 1.0)
+        for quarter in range(1, 17):
+            imu.read(quarter * 250_000_000, still_drive, 0.25)
         last.append(imu.gyro_bias_rad_s)
     assert np.std(first) == pytest.approx(0.01, rel=0.15)
     assert np.std(last) == pytest.approx(math.sqrt(0.01**2 + 0.01**2 * 4), rel=0.15)
