@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from tablerunner.cli.console import Progress
 from tablerunner.cli.exits import DONE, FAILED
@@ -83,7 +84,7 @@ def launch(options: LaunchOptions, progress: Progress) -> int:
             progress.say(str(error), 'red')
             code = FAILED
         except InterruptedRunError:
-            code = DONE
+            code = FAILED
         if interrupts.asked:
             progress.say(f'ended by {interrupts.name}')
         progress.say(f'logs, parameters and what was recorded: {folder.path}')
@@ -96,7 +97,7 @@ def _drive(session: Session, options: LaunchOptions, progress: Progress) -> int:
         session.wait(lambda: False, lambda: situation(session))
         return DONE
     outcome = deliver(session, options.deliver, options.wait_s, options.return_home, progress)
-    return DONE if outcome is None or outcome.success else FAILED
+    return DONE if outcome is not None and outcome.success else FAILED
 
 
 def deliver(
@@ -171,22 +172,22 @@ class _Follower:
         feedback = self._delivery.feedback
         if feedback is None:
             return situation(self._session)
-        return (
-            f'{situation(self._session)}  {feedback.state} to {feedback.stop}, '
-            f'{feedback.distance_left:.1f} m left'
-        )
+        return f'{situation(self._session)}  {_activity(feedback)}'
 
     def _tell(self) -> None:
         feedback = self._delivery.feedback
         if feedback is not None and (feedback.state, feedback.stop) != self._said:
             self._said = (feedback.state, feedback.stop)
-            left = f', {feedback.distance_left:.1f} m left' if feedback.distance_left else ''
-            self._progress.say(
-                f'{elapsed_s(self._session):6.1f} s  {feedback.state} ({feedback.stop}{left})'
-            )
+            self._progress.say(f'{elapsed_s(self._session):6.1f} s  {_activity(feedback)}')
         for touch in self._session.monitor.touches[self._touches :]:
             self._progress.say(f'{elapsed_s(self._session):6.1f} s  {touch.words}', 'red')
         self._touches = len(self._session.monitor.touches)
+
+
+def _activity(feedback: Any) -> str:
+    left = feedback.distance_left
+    way = f', {left:.1f} m to go' if math.isfinite(left) and left > 0.0 else ''
+    return f'{feedback.state} ({feedback.stop}{way})'
 
 
 def elapsed_s(session: Session) -> float:

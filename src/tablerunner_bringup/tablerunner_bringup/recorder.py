@@ -64,7 +64,8 @@ class _Track:
     profile: QoSProfile
     count: int = 0
     sequence: int = 0
-    alone: bool = True  # one publisher, so that gaps in its numbers are losses
+    gap: int = 0  # numbers left out since the last look at the graph
+    publisher: bytes = b''  # the only one there was then; empty: several
 
 
 @dataclass
@@ -161,6 +162,8 @@ class Recorder:
                 self.losses.refused[topic] = 'published as ' + ' and as '.join(sorted(types))
                 continue
             self._follow(topic, types[0], [info.qos_profile for info in infos])
+            if topic in self._tracks:
+                self._count_gap(topic, [bytes(info.endpoint_gid) for info in infos])
 
     def drain(self) -> int:
         """Take everything that has arrived and write it in order of arrival; return how many."""
@@ -208,10 +211,11 @@ class Recorder:
                 for data, info in take_all(track.subscription)
             ]
 
-    def _arrival(self, topic: str, track: _Track, data: bytes, info: dict[str, int]) -> Arrival:
+    @staticmethod
+    def _arrival(topic: str, track: _Track, data: bytes, info: dict[str, int]) -> Arrival:
         number = info.get('publication_sequence_number') or 0
-        if track.alone and number > track.sequence + 1 and track.sequence:
-            self.losses.missed[topic] += number - track.sequence - 1
+        if track.sequence and number > track.sequence + 1:
+            track.gap += number - track.sequence - 1
         track.sequence = number
         return Arrival(info['received_timestamp'] or time.time_ns(), topic, data)
 
@@ -233,9 +237,16 @@ class Recorder:
             old = track.subscription
             track.subscription = self._subscribe(topic, track.msgtype, profile)
             track.profile = profile
-            track.sequence = 0
+            track.sequence = track.gap = 0
             self._node.destroy_subscription(old)
-        self._tracks[topic].alone = len(offered) == 1
+
+    def _count_gap(self, topic: str, publishers: list[bytes]) -> None:
+        """Take gaps for losses, if one publisher alone numbered the messages all the while."""
+        track = self._tracks[topic]
+        alone = publishers[0] if len(publishers) == 1 else b''
+        if track.gap and alone and alone == track.publisher:
+            self.losses.missed[topic] += track.gap
+        track.publisher, track.gap = alone, 0
 
     def _subscribe(self, topic: str, msgtype: str, profile: QoSProfile) -> Subscription:
         return self._node.create_subscription(

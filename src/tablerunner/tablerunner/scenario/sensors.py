@@ -103,7 +103,7 @@ class WheelErrors(Config):
         low=0.0,
     )
     command_timeout: float = parameter(
-        0.4, description='the base stops when the last command is older', unit='s', above=0.0
+        0.25, description='the base stops when the last command is older', unit='s', above=0.0
     )
 
 

@@ -1,0 +1,61 @@
+"""Whole runs over DDS: a meal arrives."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from tablerunner.bags.reader import BagReader
+from tablerunner_bringup.nodes import NODES
+
+pytestmark = pytest.mark.slow
+
+DELIVER = ('--deliver', 'table_1', '--wait', '0.5')
+RECORDED = ('/odometry/filtered', '/ground_truth', '/uwb/exchanges', '/tf_static', '/uwb/anchors')
+
+
+def test_launch_delivery_reaches_table_and_home(start, room, domain):
+    """The meal arrives, the robot comes home, everything is recorded, nothing is left running."""
+    run = start(
+        *('--scenario', str(room), *DELIVER, '--record', '--domain', str(domain)), domain=domain
+    )
+    assert run.wait_end(120.0) == 0, run.process.output
+    assert '2 of 2 stops reached' in run.process.output
+    with BagReader(run.folder / 'bag') as bag:
+        assert not bag.damage
+        counts = {topic.name: topic.count for topic in bag.topics}
+        assert all(counts[name] > 0 for name in RECORDED)
+        duration_s = (bag.end - bag.start) * 1e-9
+        assert counts['/ground_truth'] == pytest.approx(50 * duration_s, rel=0.1)
+    for spec in NODES:
+        assert (run.folder / 'logs' / f'{spec.name}.log').exists()
+        text = (run.folder / 'params' / f'{spec.name}.yaml').read_text(encoding='utf-8')
+        assert yaml.safe_load(text)[f'/**/{spec.name}']['ros__parameters']
+
+
+def test_launch_two_at_once_do_not_disturb_each_other(start, room):
+    """Two runs without a word on domains take one each, and both deliver."""
+    arguments = ('--scenario', str(room), *DELIVER)
+    runs = [start(*arguments, '--seed', str(seed), name=f'run_{seed}') for seed in (1, 2)]
+    assert [run.wait_end(180.0) for run in runs] == [0, 0]
+    domains = {run.process.output.partition('ROS domain ')[2].split()[0] for run in runs}
+    assert len(domains) == 2
+
+
+def test_launch_unknown_start_finds_itself_and_delivers(start, room, domain):
+    """Without a known pose the robot finds its heading by driving, then delivers."""
+    run = start(
+        *('--scenario', str(room), *DELIVER, '--unknown-start', '--domain', str(domain)),
+        domain=domain,
+    )
+    assert run.wait_end(180.0) == 0, run.process.output
+    assert 'finding its heading' in run.process.output
+
+
+def test_launch_namespace_delivers(start, room, domain):
+    """All names are relative: in a namespace the robot works the same."""
+    run = start(
+        *('--scenario', str(room), *DELIVER, '--namespace', 'robot2', '--domain', str(domain)),
+        domain=domain,
+    )
+    assert run.wait_end(120.0) == 0, run.process.output
