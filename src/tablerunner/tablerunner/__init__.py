@@ -1,3 +1,3 @@
-"""Tablerunner's core library: ranging, odometry, estimation, control and simulation without ROS."""
+"""Tablerunner's core: ranging, odometry, estimation, control and simulation without ROS."""
 
 __version__ = '0.1.0'

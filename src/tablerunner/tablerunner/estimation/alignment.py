@@ -3,9 +3,9 @@
 Ranges to one tag say nothing about heading until the robot has moved. Over a window of odometry
 and ranges the unknowns are the pose of base_link *now* and each anchor's range bias; odometry says
 where the tag was, seen from now, when each range was taken. The maximum a posteriori estimate is
-sought from many headings at once (Levenberg-Marquardt, Cauchy loss against NLOS). It is believed
-only when heading and position are well determined and no other heading explains the window nearly
-as well.
+sought from many headings and from both sides of the anchors at once (Levenberg-Marquardt, Cauchy
+loss against NLOS). It is believed only when heading and position are well determined and no other
+pose explains the window nearly as well.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from tablerunner.config import Config, parameter
 from tablerunner.geometry.angles import wrap
 from tablerunner.types import UNKNOWN_YAW_VARIANCE, Matrix, Vector
 
-_STARTS = 12
+_HEADINGS = 8  # from each of two places
 _ITERATIONS = 15
 _CAUCHY = 2.0  # residual, in standard deviations, at which a range loses half its weight
-_SAME_HEADING = math.radians(20.0)  # closer results are one solution
+_SAME_HEADING = math.radians(20.0)  # results closer than this, and than ...
+_SAME_PLACE_M = 0.5  # ... this, are one solution
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class AlignmentConfig(Config):
     )
     ambiguity: float = parameter(
         6.0,
-        description='By how much (log likelihood) any other heading must fit worse',
+        description='By how much (log likelihood) any other pose must fit worse',
         above=0.0,
         high=100.0,
     )
@@ -129,7 +130,8 @@ def align(window: Window, bias_prior: Matrix, config: AlignmentConfig) -> Alignm
     covariance = np.linalg.inv(information) * max(1.0, scale)
     covariance[2, 2] += window.turned_variance
     turned = np.abs(wrap(mean[:, 2] - mean[best, 2]))
-    rivals = cost[turned > _SAME_HEADING]
+    away = np.hypot(mean[:, 0] - mean[best, 0], mean[:, 1] - mean[best, 1])
+    rivals = cost[(turned > _SAME_HEADING) | (away > _SAME_PLACE_M)]
     lead = (float(rivals.min()) - float(cost[best])) / max(1.0, scale) if len(rivals) else np.inf
     words = _missing(covariance, lead, config)
     if covariance[2, 2] > 0.5 * UNKNOWN_YAW_VARIANCE or lead < config.ambiguity:
@@ -145,7 +147,7 @@ def _missing(covariance: Matrix, lead: float, config: AlignmentConfig) -> str:
     if heading > config.max_heading_std:
         return 'heading unknown: drive'
     if lead < config.ambiguity:
-        return 'heading ambiguous: drive a curve'
+        return 'pose ambiguous: drive a curve'
     return ''
 
 
@@ -178,10 +180,10 @@ def _residuals(mean: Matrix, window: Window) -> tuple[Matrix, Matrix]:
 
 def _minimise(window: Window, prior: Matrix) -> tuple[Matrix, Vector, Matrix]:
     size = len(prior)
-    mean = np.zeros((_STARTS, size))
-    mean[:, :2] = window.anchors[:, :2].mean(axis=0)
-    mean[:, 2] = np.linspace(-np.pi, np.pi, _STARTS, endpoint=False)
-    damping = np.full(_STARTS, 1e-2)
+    mean = np.zeros((2 * _HEADINGS, size))
+    mean[:, :2] = _both_sides(window)
+    mean[:, 2] = np.linspace(-np.pi, np.pi, 2 * _HEADINGS, endpoint=False)
+    damping = np.full(2 * _HEADINGS, 1e-2)
     cost, gradient, normal = _expand(mean, window, prior)
     for _ in range(_ITERATIONS):
         damped = normal.copy()
@@ -199,6 +201,19 @@ def _minimise(window: Window, prior: Matrix) -> tuple[Matrix, Vector, Matrix]:
         damping = np.where(better, damping * 0.2, damping * 8.0)
     mean[:, 2] = wrap(mean[:, 2])
     return mean, cost, normal
+
+
+def _both_sides(window: Window) -> Matrix:
+    """Return starting places, shape (k, 2), alternating between the sides of the anchors' axis.
+
+    Anchors in a line see a place and its mirror image alike: a search that began on one side only
+    would never meet the other.
+    """
+    centre = window.anchors[:, :2].mean(axis=0)
+    axes = np.linalg.svd(window.anchors[:, :2] - centre, full_matrices=False)[2]
+    offset = 0.5 * float(np.median(window.ranges)) * axes[1]
+    side = np.where(np.arange(2 * _HEADINGS) % 2 == 0, 1.0, -1.0)
+    return np.asarray(centre + side[:, None] * offset)
 
 
 def _expand(mean: Matrix, window: Window, prior: Matrix) -> tuple[Vector, Matrix, Matrix]:

@@ -10,6 +10,8 @@ from tablerunner.errors import ConfigError
 
 @dataclass(frozen=True)
 class Mast(Config):
+    """A part of a site."""
+
     name: str = parameter(description='Name')
     position: tuple[float, float] = parameter(description='x, y', unit='m', low=-10.0)
     kind: str = parameter('pole', description='Kind', choices=('pole', 'wall'))
@@ -17,6 +19,8 @@ class Mast(Config):
 
 @dataclass(frozen=True)
 class Site(Config):
+    """A file's worth of configuration."""
+
     masts: tuple[Mast, ...] = parameter(description='Masts')
     rate: float = parameter(10.0, description='Rate', unit='Hz', above=0.0, high=100.0)
     count: int = parameter(3, description='Count', low=1)
@@ -24,6 +28,7 @@ class Site(Config):
     limits: dict[str, float] = parameter(factory=dict, description='Limits by name')
 
     def check(self) -> None:
+        """Refuse a fourth mast."""
         if len(self.masts) > 3:
             raise ConfigError('masts', len(self.masts), 'at most three')
 

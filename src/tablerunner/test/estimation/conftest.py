@@ -13,6 +13,7 @@ from tablerunner.odometry.motion import Motion, advance
 from tablerunner.types import Anchor, OdometrySample, RangeSample
 
 STEP = 20_000_000
+EARLIER = 7_000_000
 ANCHORS = tuple(
     Anchor(f'A{i}', position)
     for i, position in enumerate(
@@ -31,7 +32,10 @@ class Drive:
     truth: dict[int, Pose2]
 
 
-def make_drive(seed, seconds=20.0, start=Pose2(4.0, 3.0, 0.8), noise=0.1, bias=0.0, **options):
+START = Pose2(4.0, 3.0, 0.8)
+
+
+def make_drive(seed, seconds=20.0, start=START, noise=0.1, bias=0.0, **options):
     """Drive gentle curves; odometry is exact but for `scale` and `drift` [rad/s]."""
     rng = np.random.default_rng(seed)
     scale, drift = options.get('scale', 0.0), options.get('drift', 0.0)
@@ -42,8 +46,9 @@ def make_drive(seed, seconds=20.0, start=Pose2(4.0, 3.0, 0.8), noise=0.1, bias=0
     for k in range(1, int(seconds * 50) + 1):
         stamp = 1_000_000_000 + k * STEP
         speed = 0.5 if k * 0.02 > still else 0.0
-        turn = 0.35 * math.sin(0.25 * k * 0.02) if speed else 0.0
-        true = advance(true, Motion(speed * 0.02, turn * 0.02, 0.02))
+        curve = 0.35 * math.sin(0.25 * k * 0.02) if options.get('turning', True) else 0.0
+        turn = curve if speed else 0.0
+        before, true = true, advance(true, Motion(speed * 0.02, turn * 0.02, 0.02))
         told = Motion(speed * 0.02 / (1 + scale), (turn + (drift if speed else 0.0)) * 0.02, 0.02)
         odom = advance(odom, told)
         drive.odometry.append(
@@ -52,11 +57,15 @@ def make_drive(seed, seconds=20.0, start=Pose2(4.0, 3.0, 0.8), noise=0.1, bias=0
         drive.truth[stamp] = true
         if k % 2 == 0:
             anchor = ANCHORS[(k // 2) % 4]
-            tag = true.transform(np.array(LEVER[:2]))
+            # Ranges fall between odometry stamps: 7 ms before the one that follows.
+            then = advance(before, Motion(speed * 0.013, turn * 0.013, 0.013))
+            tag = then.transform(np.array(LEVER[:2]))
             distance = math.dist((*tag, LEVER[2]), anchor.position)
             measured = distance + biases[(k // 2) % 4] + rng.normal(0, noise)
             drive.ranges.append(
-                RangeSample(stamp, anchor.anchor_id, 'tag', k, measured, max(noise, 1e-3) ** 2)
+                RangeSample(
+                    stamp - EARLIER, anchor.anchor_id, 'tag', k, measured, max(noise, 1e-3) ** 2
+                )
             )
     return drive
 

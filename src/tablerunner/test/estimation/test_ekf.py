@@ -36,7 +36,7 @@ def test_predict_and_update_equal_filterpy(room):
     reference = ExtendedKalmanFilter(dim_x=size, dim_z=1)
     reference.x, reference.P = ours.mean.copy(), ours.covariance.copy()
     number = {anchor.anchor_id: k for k, anchor in enumerate(room.anchors)}
-    ranges = {sample.stamp: sample for sample in drive.ranges}
+    ranges = {drive.odometry[sample.sequence - 1].stamp: sample for sample in drive.ranges}
     motion = Motion(0.01, 0.003, 0.02)
     for odometry in drive.odometry:
         ours = ekf.predict(ours, motion, odometry.stamp)
@@ -97,7 +97,9 @@ def test_update_outlier_inside_the_gate_pulls_less_than_its_share(room):
     expected, _ = predict_range(before.mean, room.anchors[0].position, room.lever, 0)
     pulls = []
     for deviations in (1.0, 2.0, 3.0):
-        spread = math.sqrt(ekf.update(before, RangeSample(2, 'A0', 't', 0, expected, 0.01))[1].covariance[0, 0])
+        spread = math.sqrt(
+            ekf.update(before, RangeSample(2, 'A0', 't', 0, expected, 0.01))[1].covariance[0, 0]
+        )
         sample = RangeSample(2, 'A0', 't', 0, expected + deviations * spread, 0.01)
         after, innovation = ekf.update(before, sample)
         assert innovation.nis == pytest.approx(deviations**2)
@@ -123,7 +125,9 @@ def test_update_pose_equals_linear_kalman_filter(room):
     ekf = Ekf(OPEN, room.anchors, room.lever)
     before = ekf.start(start())
     noise = np.array([[0.04, 0.01, 0.0], [0.01, 0.03, 0.0], [0.0, 0.0, 0.02]])
-    after, innovation = ekf.update(before, PoseSample(2, Pose2(4.2, 2.9, 0.7), noise, 'camera/pose'))
+    after, innovation = ekf.update(
+        before, PoseSample(2, Pose2(4.2, 2.9, 0.7), noise, 'camera/pose')
+    )
     prior = before.covariance[:3, :3]
     information = np.linalg.inv(prior) + np.linalg.inv(noise)
     assert after.covariance[:3, :3] == pytest.approx(np.linalg.inv(information), abs=1e-12)

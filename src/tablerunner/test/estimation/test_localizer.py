@@ -37,7 +37,7 @@ def reasons(outcome):
 
 @pytest.fixture
 def tracking(room):
-    """A localiser that has tracked for five seconds, and its drive."""
+    """Return a localiser that has tracked for five seconds, and its drive."""
     drive = room.drive(1, seconds=5.0)
     localizer = Localizer(CONFIG, room.anchors)
     feed(localizer, in_time(drive))
@@ -68,7 +68,7 @@ def test_scale_and_gyro_bias_are_learned(room):
 
 
 def test_map_to_odom_joins_estimate_and_odometry(tracking):
-    """map -> odom -> base_link is the estimate."""
+    """The chain map -> odom -> base_link is the estimate."""
     localizer, drive = tracking
     joined = localizer.map_to_odom @ drive.odometry[-1].pose
     assert joined.distance_to(localizer.estimate.pose) < 1e-9

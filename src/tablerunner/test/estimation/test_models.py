@@ -22,9 +22,7 @@ STATES = st.tuples(
     st.floats(-0.3, 0.3),
     st.floats(-0.3, 0.3),
 ).map(np.array)
-MOTIONS = st.builds(
-    Motion, st.floats(0.001, 0.3), st.floats(-0.5, 0.5), st.floats(0.01, 0.2)
-)
+MOTIONS = st.builds(Motion, st.floats(0.001, 0.3), st.floats(-0.5, 0.5), st.floats(0.01, 0.2))
 H = 1e-6
 
 

@@ -23,9 +23,7 @@ POSES = st.builds(Pose2, COORDINATE, COORDINATE, st.floats(-math.pi, math.pi))
 
 
 def close(one: Pose2, other: Pose2) -> bool:
-    return (
-        one.distance_to(other) < 1e-9 and abs(difference(one.heading, other.heading)) < 1e-9
-    )
+    return one.distance_to(other) < 1e-9 and abs(difference(one.heading, other.heading)) < 1e-9
 
 
 @given(st.floats(-1e4, 1e4))

@@ -11,9 +11,7 @@ from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry.motion import Motion, MotionNoise, advance, between_poses
 
-POSES = st.builds(
-    Pose2, st.floats(-20, 20), st.floats(-20, 20), st.floats(-math.pi, math.pi)
-)
+POSES = st.builds(Pose2, st.floats(-20, 20), st.floats(-20, 20), st.floats(-math.pi, math.pi))
 
 
 @given(POSES, st.floats(-0.5, 0.5), st.floats(-1.0, 1.0))

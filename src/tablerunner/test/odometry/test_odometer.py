@@ -73,6 +73,15 @@ def test_gyro_turning_while_wheels_stand_is_no_bias():
     assert last.pose.heading == pytest.approx(1.0, abs=0.02)
 
 
+def test_gyro_ramp_is_integrated_exactly():
+    """A yaw rate that grows linearly is integrated without error by the trapezoid."""
+    odometer = Odometer(config())
+    for k in range(1, 102):
+        odometer.add_imu(ImuSample(k * STEP, 0.01 * (k - 1)))
+        last = odometer.add_wheels(WheelSample(k * STEP, 0.1 * k, 0.1 * k))
+    assert last.pose.heading == pytest.approx(0.5 * 1.0 * 2.0, abs=1e-9)
+
+
 def test_silent_imu_falls_back_to_the_wheels_and_says_so():
     """Without IMU the wheels give the turn; when it is back the gyro does again."""
     odometer = Odometer(config())
@@ -117,7 +126,9 @@ def test_covariance_matches_the_scatter_of_many_runs():
     model = MotionNoise(**noise, heading_per_time=0.0)
     ds, dt = 0.5 * 0.02, 0.15 * 0.02
     sd_distance = noise['distance'] * math.sqrt(ds)
-    sd_turn = math.sqrt(noise['heading_per_turn'] ** 2 * dt + noise['heading_per_distance'] ** 2 * ds)
+    sd_turn = math.sqrt(
+        noise['heading_per_turn'] ** 2 * dt + noise['heading_per_distance'] ** 2 * ds
+    )
     assert model.heading_per_time == 0.0
     x, y, heading = np.zeros(runs), np.zeros(runs), np.zeros(runs)
     for _ in range(400):

@@ -53,9 +53,7 @@ def test_add_weak_first_path_is_marked_nlos():
     ranger = Ranger(CONFIG)
     clear = ranger.add(sample(sequence=1))
     blocked = ranger.add(sample(stamp=2 * SECOND, sequence=2, gap=15.0))
-    silent = ranger.add(
-        replace(sample(stamp=3 * SECOND, sequence=3), rx_power_dbm=math.nan)
-    )
+    silent = ranger.add(replace(sample(stamp=3 * SECOND, sequence=3), rx_power_dbm=math.nan))
     assert [item.los for item in (clear, blocked, silent)] == [
         LosState.LOS,
         LosState.NLOS,
