@@ -73,8 +73,37 @@ class Probe:
         for message in messages:
             publisher.publish(message)
 
+    def repeat(
+        self,
+        topic: str,
+        make: Callable[[], Any],
+        until: Callable[[], T],
+        what: str,
+        limit_s: float = LIMIT_S,
+        period_s: float = 0.05,
+    ) -> T:
+        """Publish what `make` returns again and again until a condition holds; return that.
+
+        For best-effort topics of other processes: what is published before the other side knows
+        of this one is lost, and nobody can tell from here.
+        """
+        last = -period_s
+
+        def step() -> T:
+            nonlocal last
+            now = time.monotonic()
+            if now - last >= period_s:
+                last = now
+                self.publish(topic, make())
+            return until()
+
+        return self.wait_for(step, what, limit_s)
+
     def connected(self, topic: str, limit_s: float = LIMIT_S) -> None:
-        """Wait until somebody subscribes to what the probe publishes on a topic."""
+        """Wait until this side knows a subscriber of what the probe publishes on a topic.
+
+        To a node in this process nothing is lost then; to others see `repeat`.
+        """
         publisher = self._publishers[topic]
         self.wait_for(
             lambda: publisher.get_subscription_count() > 0, f'a subscriber of {topic}', limit_s
