@@ -141,7 +141,7 @@ def test_node_publishes_where_its_sensors_sit(
 
 
 def test_node_drives_and_stops_on_silence(probe: Probe, processes: Processes, room: Path) -> None:
-    """While commands come it drives; after the last, at most v 0.4 s + v^2/2a + v T further."""
+    """While commands come it drives; after the last it stands within v t_out + v^2/2a + v T."""
     truth = probe.listen(Odometry, 'ground_truth')
     probe.speak(Twist, 'cmd_vel')
     start(processes, room)
@@ -158,7 +158,7 @@ def test_node_drives_and_stops_on_silence(probe: Probe, processes: Processes, ro
     probe.wait_for(lambda: abs(truth[-1].twist.twist.linear.x) < 0.002, 'a stand')
     after = truth[-1].pose.pose.position.x
     # 0.2 m: the probe's truth is late on a busy machine; exact distances are tested in the core.
-    assert 0.1 < after - before < 0.5 * 0.4 + 0.5**2 / 2.4 + 0.5 * 0.08 + 0.2
+    assert 0.05 < after - before < 0.5 * 0.25 + 0.5**2 / 2.4 + 0.5 * 0.08 + 0.2
     probe.wait_diagnostic('sim_bridge', 'command stale', 'true')
 
 

@@ -81,6 +81,15 @@ def test_bumper_person_walking_into_the_side_of_a_driving_robot_is_not_its_fault
     assert [c.robot_at_fault for c in contacts] == [False]
 
 
+def test_bumper_person_who_comes_again_is_counted_anew(
+    make_scenario: MakeScenario, make_person: MakePerson
+) -> None:
+    """Turned away after waiting, and back into the robot from the end of the route: two."""
+    person = make_person(yield_probability=0.0, patience=1.0)
+    contacts = contacts_of(Simulator(make_scenario(people=(person,)), 0), Velocity(), 10.0)
+    assert [c.name for c in contacts] == ['somebody', 'somebody']
+
+
 def test_bumper_people_who_yield_are_not_touched_by_a_standing_robot(
     make_scenario: MakeScenario, make_person: MakePerson
 ) -> None:

@@ -106,6 +106,19 @@ def test_walker_who_does_not_yield_stops_only_at_touch(make_person: MakePerson) 
     assert gap == pytest.approx(0.0, abs=0.011)
 
 
+def test_walker_decides_anew_at_each_encounter(make_person: MakePerson) -> None:
+    """Who yielded to the robot once need not do so the next time."""
+    walker = walker_of(make_person(yield_probability=0.5, patience=100.0, speed=0.5), seed=1)
+    yielded = []
+    for _ in range(40):
+        here = walker.state.pose
+        ahead = Pose2(here.x + math.cos(here.heading), here.y, 0.0)
+        walk(walker, 0.9, ahead)  # 0.5 m between the bodies, 0.45 m to walk
+        yielded.append(walker.state.speed_m_s == 0.0)
+        walk(walker, 0.1)
+    assert 8 < sum(yielded) < 32
+
+
 def test_walker_goes_on_when_the_robot_has_gone(make_person: MakePerson) -> None:
     walker = walker_of(make_person(patience=100.0))
     walk(walker, 5.0, robot=Pose2(5.0, 5.0, 0.0))
