@@ -1,0 +1,31 @@
+"""One measured figure beside what it is compared with."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Result:
+    """A figure of ours, a reference measured in the same run, and their ratio."""
+
+    name: str
+    ours: float
+    reference: float
+    ratio: float
+    unit: str
+    what: str
+    bound: float | None = None  # what the ratio should keep; None where nothing is promised
+    at_most: bool = True
+
+    @property
+    def kept(self) -> bool:
+        """Whether the ratio keeps its bound."""
+        if self.bound is None:
+            return True
+        return self.ratio <= self.bound if self.at_most else self.ratio >= self.bound
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, for JSON."""
+        return {**asdict(self), 'kept': self.kept}
