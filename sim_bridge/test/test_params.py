@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from sim_bridge.params import BridgeConfig
 
+from sim_bridge.params import BridgeConfig
 from tablerunner.config import parameters_of
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
