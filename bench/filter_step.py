@@ -11,7 +11,7 @@ from result import Result
 
 from tablerunner.estimation import EstimatorConfig, Start
 from tablerunner.estimation.ekf import Ekf
-from tablerunner.estimation.models.motion_model import move
+from tablerunner.estimation.models.motion_model import move, state_jacobian
 from tablerunner.estimation.models.range_model import predict_range
 from tablerunner.odometry import Motion
 from tablerunner.types import Anchor, RangeSample
@@ -21,7 +21,9 @@ ROUNDS = 5
 LEVER = (0.0, 0.0, 1.1)
 ANCHORS = tuple(
     Anchor(f'A{i}', place)
-    for i, place in enumerate([(0.0, 0.0, 2.2), (15.0, 0.0, 2.2), (15.0, 15.0, 2.2), (0.0, 15.0, 2.2)])
+    for i, place in enumerate(
+        [(0.0, 0.0, 2.2), (15.0, 0.0, 2.2), (15.0, 15.0, 2.2), (0.0, 15.0, 2.2)]
+    )
 )
 CONFIG = EstimatorConfig(huber=100.0, gate=1e6)
 MOTION = Motion(0.01, 0.002, 0.02)
@@ -57,10 +59,10 @@ def filterpy() -> None:
 
     ekf.predict_x = predict_x
     for k in range(STEPS):
-        moved, by_state, by_input = move(ekf.x, MOTION)
+        moved, coupling, by_input = move(ekf.x, MOTION)
         noise = np.diag(walk)
         noise[:3, :3] += by_input @ np.diag([distance, turn]) @ by_input.T
-        ekf.F, ekf.Q = by_state, noise
+        ekf.F, ekf.Q = state_jacobian(coupling, size), noise
         ekf.predict()
         anchor, index = ANCHORS[k % 4].position, k % 4
         ekf.update(

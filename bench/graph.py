@@ -19,7 +19,9 @@ _STOPS = ('table_1', 'table_3', 'table_9', 'table_4')
 
 
 @contextmanager
-def running(real_time_factor: float, stops: tuple[str, ...] = _STOPS) -> Iterator[dict[str, psutil.Process]]:
+def running(
+    real_time_factor: float, stops: tuple[str, ...] = _STOPS
+) -> Iterator[dict[str, psutil.Process]]:
     """Run `tablerunner launch` on a long round; yield its nodes by name once all are up."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, '-m', 'tablerunner.cli.main', 'launch', '-o', f'{folder}/run']

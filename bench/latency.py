@@ -126,7 +126,9 @@ def ours() -> list[float]:
     def start(processes: Processes) -> None:
         anchors = [number for place in ANCHORS for number in place]
         ids = [f'A{k}' for k in range(4)]
-        processes.node('uwb_driver', 'uwb_driver', {'anchor_ids': ids, 'anchor_positions': anchors})
+        processes.node(
+            'uwb_driver', 'uwb_driver', {'anchor_ids': ids, 'anchor_positions': anchors}
+        )
         processes.node('odom_node', 'odom_node', {'heading_source': 'wheels'})
         pose = [PLACE[0], PLACE[1], 0.0]
         processes.node('fusion_node', 'fusion_node', {'initial_pose': pose})

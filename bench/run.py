@@ -36,7 +36,9 @@ def main() -> int:
     arguments = parser.parse_args()
     unknown = [name for name in arguments.only if name not in BENCHES]
     if unknown:
-        print(f'no such bench: {", ".join(unknown)}; there are {", ".join(BENCHES)}', file=sys.stderr)
+        print(
+            f'no such bench: {", ".join(unknown)}; there are {", ".join(BENCHES)}', file=sys.stderr
+        )
         return 2
     console = Console(stderr=True)
     results: list[Result] = []
@@ -47,7 +49,9 @@ def main() -> int:
             console.print(f'  {result.name}: {result.ratio:.3g} ({result.what})', highlight=False)
         results += found
     arguments.json.parent.mkdir(parents=True, exist_ok=True)
-    arguments.json.write_text(json.dumps([result.to_dict() for result in results], indent=2) + '\n')
+    arguments.json.write_text(
+        json.dumps([result.to_dict() for result in results], indent=2) + '\n'
+    )
     Console(width=None if sys.stdout.isatty() else 140).print(table(results))
     print(f'written: {arguments.json}')
     return 0
@@ -57,7 +61,9 @@ def table(results: list[Result]) -> Table:
     """Return the results as a table."""
     grid = Table('name', 'ours', 'reference', 'ratio', 'unit', 'bound', 'what')
     for item in results:
-        bound = '' if item.bound is None else ('<= ' if item.at_most else '>= ') + f'{item.bound:g}'
+        bound = (
+            '' if item.bound is None else ('<= ' if item.at_most else '>= ') + f'{item.bound:g}'
+        )
         grid.add_row(
             item.name,
             f'{item.ours:.4g}',

@@ -14,7 +14,7 @@ import numpy as np
 
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.estimator import EstimatorConfig, Measurement, Start
-from tablerunner.estimation.models.motion_model import move
+from tablerunner.estimation.models.motion_model import move, transport
 from tablerunner.estimation.models.range_model import Point3, predict_range
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
@@ -97,10 +97,9 @@ class Ekf:
 
     def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
         """Return the estimate carried to `stamp` by a motion."""
-        moved, by_state, by_input = move(estimate.mean, motion)
-        covariance = by_state @ estimate.covariance @ by_state.T
-        distance, turn = self.config.motion.variances(motion)
-        covariance[:3, :3] += (by_input * (distance, turn)) @ by_input.T
+        moved, coupling, by_input = move(estimate.mean, motion)
+        covariance = transport(estimate.covariance, coupling)
+        covariance[:3, :3] += (by_input * self.config.motion.variances(motion)) @ by_input.T
         walk = self._walk_per_time * motion.dt_s
         walk[SCALE] = self.config.scale_walk**2 * abs(motion.distance_m)
         covariance.flat[:: self._size + 1] += walk
@@ -120,25 +119,24 @@ class Ekf:
         expected, jacobian = predict_range(estimate.mean, anchor.position, self.lever_arm, index)
         innovation = sample.range_m - anchor.bias_m - expected
         projected = estimate.covariance @ jacobian
+        own = float(jacobian @ projected)
         noise = range_variance(config, sample)
-        spread = float(jacobian @ projected) + noise
+        spread = own + noise
         nis = innovation * innovation / spread
         accepted = nis <= config.gate
         reason = '' if accepted else 'beyond the gate'
         after = estimate
         if accepted:
-            deviation = math.sqrt(nis)
-            if deviation > config.huber:
+            if nis > config.huber**2:
                 # Huber: beyond the knee the pull stays constant, as if the noise were larger.
-                noise = spread * deviation / config.huber - (spread - noise)
+                noise = spread * math.sqrt(nis) / config.huber - own
                 reason = 'weight reduced'
-            gain = projected / (
-                spread if deviation <= config.huber else float(jacobian @ projected) + noise
-            )
+            gain = projected / (own + noise)
             mean = estimate.mean + gain * innovation
             mean[HEADING] = wrap(float(mean[HEADING]))
-            keep = self._identity - np.outer(gain, jacobian)
-            covariance = keep @ estimate.covariance @ keep.T + np.outer(gain * noise, gain)
+            keep = self._identity - gain[:, None] * jacobian
+            covariance = keep @ estimate.covariance @ keep.T
+            covariance += (gain * noise)[:, None] * gain
             after = Estimate(sample.stamp, mean, 0.5 * (covariance + covariance.T))
         return after, Innovation(
             sample.stamp,

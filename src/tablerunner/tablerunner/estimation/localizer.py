@@ -66,7 +66,8 @@ class Localizer:
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
         self._lost = False
-        self._recent: deque[tuple[int, bool]] = deque()
+        self._recent: deque[tuple[int, bool]] = deque()  # stamp, accepted
+        self._refused = 0  # of those
         self._accepted_stamp = 0
         self._forget_start()
 
@@ -242,6 +243,7 @@ class Localizer:
         )
         self._lost = False
         self._recent.clear()
+        self._refused = 0
         self._accepted_stamp = start.stamp
 
     def _place_fault(self, stamp: int) -> str:
@@ -294,10 +296,11 @@ class Localizer:
             self._accepted_stamp = max(self._accepted_stamp, innovation.stamp)
         recent = self._recent
         recent.append((innovation.stamp, innovation.accepted))
+        self._refused += not innovation.accepted
         while recent[-1][0] - recent[0][0] > nanoseconds(self.config.lost_window):
-            recent.popleft()
-        refused = sum(not accepted for _, accepted in recent)
-        if len(recent) >= _FEWEST_FOR_LOST and refused > self.config.lost_share * len(recent):
+            self._refused -= not recent.popleft()[1]
+        share = self._refused / len(recent)
+        if len(recent) >= _FEWEST_FOR_LOST and share > self.config.lost_share:
             self._timeline = None
             self._lost = True
             self._forget_start()

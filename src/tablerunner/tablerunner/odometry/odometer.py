@@ -128,12 +128,21 @@ class Odometer:
 
 
 def _grow(covariance: Matrix, pose: Pose2, motion: Motion, noise: MotionNoise) -> Matrix:
-    """Return the covariance of x, y, heading after a motion from `pose`, first order."""
+    """Return the covariance of x, y, heading after a motion from `pose`, first order.
+
+    F P F' + G N G' written out, which is several times faster than six products of tiny matrices:
+    F = [[1, 0, fx], [0, 1, fy], [0, 0, 1]], G = [[cos, fx / 2], [sin, fy / 2], [0, 1]].
+    """
     direction = pose.heading + 0.5 * motion.turn_rad
     cos, sin = math.cos(direction), math.sin(direction)
-    ds = motion.distance_m
-    state = np.array([[1.0, 0.0, -ds * sin], [0.0, 1.0, ds * cos], [0.0, 0.0, 1.0]])
-    inputs = np.array([[cos, -0.5 * ds * sin], [sin, 0.5 * ds * cos], [0.0, 1.0]])
+    fx, fy = -motion.distance_m * sin, motion.distance_m * cos
     distance, turn = noise.variances(motion)
-    grown = state @ covariance @ state.T + (inputs * [distance, turn]) @ inputs.T
-    return np.asarray(0.5 * (grown + grown.T))
+    (xx, xy, xh), (_, yy, yh), (_, _, hh) = covariance.tolist()
+    new_xx = xx + 2.0 * fx * xh + fx * fx * (hh + 0.25 * turn) + distance * cos * cos
+    new_yy = yy + 2.0 * fy * yh + fy * fy * (hh + 0.25 * turn) + distance * sin * sin
+    new_xy = xy + fx * yh + fy * xh + fx * fy * (hh + 0.25 * turn) + distance * cos * sin
+    new_xh = xh + fx * (hh + 0.5 * turn)
+    new_yh = yh + fy * (hh + 0.5 * turn)
+    return np.array(
+        [[new_xx, new_xy, new_xh], [new_xy, new_yy, new_yh], [new_xh, new_yh, hh + turn]]
+    )

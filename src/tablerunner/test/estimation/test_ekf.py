@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation import EstimatorConfig, Start
 from tablerunner.estimation.ekf import Ekf
-from tablerunner.estimation.models.motion_model import move
+from tablerunner.estimation.models.motion_model import move, state_jacobian
 from tablerunner.estimation.models.range_model import predict_range
 from tablerunner.estimation.models.state import RANGE_BIAS
 from tablerunner.geometry.pose import Pose2
@@ -40,7 +40,8 @@ def test_predict_and_update_equal_filterpy(room):
     motion = Motion(0.01, 0.003, 0.02)
     for odometry in drive.odometry:
         ours = ekf.predict(ours, motion, odometry.stamp)
-        moved, by_state, by_input = move(reference.x, motion)
+        moved, coupling, by_input = move(reference.x, motion)
+        by_state = state_jacobian(coupling, size)
         distance, turn = OPEN.motion.variances(motion)
         noise = np.zeros((size, size))
         noise[:3, :3] = by_input @ np.diag([distance, turn]) @ by_input.T

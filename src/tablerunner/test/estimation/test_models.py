@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablerunner.estimation.models.motion_model import move
+from tablerunner.estimation.models.motion_model import move, state_jacobian, transport
 from tablerunner.estimation.models.range_model import predict_range
 from tablerunner.estimation.models.state import HEADING, RANGE_BIAS
 from tablerunner.geometry.angles import wrap
@@ -35,7 +35,8 @@ def unwrapped(after, before):
 @given(STATES, MOTIONS)
 def test_move_jacobian_by_state_equals_finite_differences(mean, motion):
     """d(moved)/d(state), column by column."""
-    _, by_state, _ = move(mean, motion)
+    _, coupling, _ = move(mean, motion)
+    by_state = state_jacobian(coupling, len(mean))
     for column in range(len(mean)):
         step = np.zeros(len(mean))
         step[column] = H
@@ -54,12 +55,23 @@ def test_move_jacobian_by_input_equals_finite_differences(mean, motion):
         assert by_input[:, column] == pytest.approx(slope, abs=1e-6)
 
 
+@given(STATES, MOTIONS, st.integers(0, 1000))
+def test_transport_equals_the_full_product(mean, motion, seed):
+    """The short form of F P F' is F P F'."""
+    root = np.random.default_rng(seed).normal(size=(len(mean), len(mean)))
+    covariance = root @ root.T
+    _, coupling, _ = move(mean, motion)
+    jacobian = state_jacobian(coupling, len(mean))
+    full = jacobian @ covariance @ jacobian.T
+    assert transport(covariance, coupling) == pytest.approx(full, abs=1e-9)
+
+
 def test_move_at_standstill_holds_the_heading_against_the_bias():
     """Where odometry says nothing moved, the gyro's bias turns nothing."""
     mean = np.array([1.0, 2.0, 0.5, 0.01, 0.02, 0.1])
-    moved, by_state, _ = move(mean, Motion(0.0, 0.0, 10.0))
+    moved, coupling, _ = move(mean, Motion(0.0, 0.0, 10.0))
     assert np.array_equal(moved, mean)
-    assert np.array_equal(by_state, np.eye(6))
+    assert not coupling.any()
 
 
 @given(STATES, st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.integers(0, 1))

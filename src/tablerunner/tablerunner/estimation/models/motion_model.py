@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from tablerunner.estimation.models.state import GYRO_BIAS, HEADING, SCALE, X, Y
+from tablerunner.estimation.models.state import HEADING, RANGE_BIAS
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import Matrix, Vector
@@ -36,28 +36,44 @@ def move(mean: Vector, motion: Motion) -> tuple[Vector, Matrix, Matrix]:
     Returns
     -------
     moved : ndarray, shape (n,)
-    by_state : ndarray, shape (n, n)
-        d(moved)/d(mean).
+    coupling : ndarray, shape (3, 3)
+        What d(moved)/d(mean) has beyond the identity: rows x, y, heading; columns heading, scale,
+        gyro_bias. See `state_jacobian`, `transport`.
     by_input : ndarray, shape (3, 2)
         d(x, y, heading)/d(distance, turn).
     """
-    size = len(mean)
     drift_s = 0.0 if motion.distance_m == 0.0 and motion.turn_rad == 0.0 else motion.dt_s
-    scale = 1.0 + float(mean[SCALE])
-    turn = motion.turn_rad - float(mean[GYRO_BIAS]) * drift_s
-    heading = float(mean[HEADING])
+    x, y, heading, scale, gyro_bias = mean[:5].tolist()
+    turn = motion.turn_rad - gyro_bias * drift_s
     cos, sin = math.cos(heading + 0.5 * turn), math.sin(heading + 0.5 * turn)
-    dx, dy = scale * motion.distance_m * cos, scale * motion.distance_m * sin
-
+    step_x, step_y = motion.distance_m * cos, motion.distance_m * sin
+    dx, dy = (1.0 + scale) * step_x, (1.0 + scale) * step_y
     moved = mean.copy()
-    moved[X] += dx
-    moved[Y] += dy
-    moved[HEADING] = wrap(heading + turn)
+    moved[:3] = x + dx, y + dy, wrap(heading + turn)
+    half_x, half_y = 0.5 * dx, 0.5 * dy
+    coupling = np.array(
+        [
+            [-dy, step_x, half_y * drift_s],
+            [dx, step_y, -half_x * drift_s],
+            [0.0, 0.0, -drift_s],
+        ]
+    )
+    by_input = np.array(
+        [[(1.0 + scale) * cos, -half_y], [(1.0 + scale) * sin, half_x], [0.0, 1.0]]
+    )
+    return moved, coupling, by_input
 
-    by_state = np.eye(size)
-    by_state[X, HEADING], by_state[Y, HEADING] = -dy, dx
-    by_state[X, SCALE], by_state[Y, SCALE] = motion.distance_m * cos, motion.distance_m * sin
-    by_state[X, GYRO_BIAS], by_state[Y, GYRO_BIAS] = 0.5 * dy * drift_s, -0.5 * dx * drift_s
-    by_state[HEADING, GYRO_BIAS] = -drift_s
-    by_input = np.array([[scale * cos, -0.5 * dy], [scale * sin, 0.5 * dx], [0.0, 1.0]])
-    return moved, by_state, by_input
+
+def state_jacobian(coupling: Matrix, size: int) -> Matrix:
+    """Return d(moved)/d(mean), shape (size, size), from the coupling of `move`."""
+    jacobian = np.eye(size)
+    jacobian[:3, HEADING:RANGE_BIAS] += coupling
+    return jacobian
+
+
+def transport(covariance: Matrix, coupling: Matrix) -> Matrix:
+    """Return F P F' for F = I + coupling, touching only the rows and columns that change."""
+    moved: Matrix = covariance.copy()
+    moved[:3] += coupling @ covariance[HEADING:RANGE_BIAS]
+    moved[:, :3] += moved[:, HEADING:RANGE_BIAS] @ coupling.T
+    return moved
