@@ -11,10 +11,12 @@ import pytest
 from nav_msgs.msg import Odometry
 
 from tablerunner_bringup.nodes import NODES
-from tablerunner_ros.testing.domain import lease_domain
+from tablerunner_ros.testing.fixtures import domain, probe
 from tablerunner_ros.testing.probe import Probe
 from tablerunner_ros.testing.process import Process
 from tablerunner_ros.testing.waiting import wait_for
+
+__all__ = ['domain', 'probe']
 
 ROOM = """\
 name: room
@@ -105,23 +107,11 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
 
 
 @pytest.fixture
-def domain() -> Iterator[int]:
-    """Return a ROS domain of the test's own."""
-    with lease_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def probe(domain: int) -> Iterator[Probe]:
-    """Return a node of the test's own in the domain."""
-    item = Probe(domain)
-    yield item
-    item.close()
-
-
-@pytest.fixture
 def driving(
-    start: Callable[..., Run], room: Path, domain: int, probe: Probe
+    start: Callable[..., Run],
+    room: Path,
+    domain: int,
+    probe: Probe,
 ) -> tuple[Run, list[Odometry]]:
     """Return a run whose robot is on its way at speed, and the list of its true movements."""
     truth = probe.listen(Odometry, 'ground_truth')

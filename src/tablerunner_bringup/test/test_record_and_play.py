@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import signal
 import sys
 from collections import defaultdict
@@ -21,7 +22,6 @@ from std_msgs.msg import String
 from tablerunner.bags.reader import BagReader
 from tablerunner_interfaces.msg import UwbExchange
 from tablerunner_ros.testing.domain import lease_domain
-from tablerunner_ros.testing.fixtures import domain, probe, processes  # noqa: F401
 from tablerunner_ros.testing.probe import Probe
 from tablerunner_ros.testing.process import Process, Processes
 
@@ -98,7 +98,7 @@ class Listener:
 
 
 @pytest.fixture
-def record(processes: Processes, tmp_path: Path) -> Callable[..., tuple[Process, Path]]:  # noqa: F811
+def record(processes: Processes, tmp_path: Path) -> Callable[..., tuple[Process, Path]]:
     """Return a starter of `tablerunner record`."""
 
     def start(*arguments: str) -> tuple[Process, Path]:
@@ -124,7 +124,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, list[
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
-def test_record_all_topics_bag_holds_every_byte(record, probe, storage):  # noqa: F811
+def test_record_all_topics_bag_holds_every_byte(record, probe, storage):
     """Both storages hold all messages in order, with definitions; `rosbags` opens them."""
     speaker = Speaker(probe)
     recorder, folder = record('--format', storage)
@@ -141,7 +141,7 @@ def test_record_all_topics_bag_holds_every_byte(record, probe, storage):  # noqa
     assert 'uint64 poll_tx' in definitions['tablerunner_interfaces/msg/UwbExchange']
 
 
-def test_record_chosen_topics_leaves_out_others(record, probe):  # noqa: F811
+def test_record_chosen_topics_leaves_out_others(record, probe):
     """Only what was asked for is in the bag; a star stands for any name."""
     speaker = Speaker(probe)
     recorder, folder = record('--topics', '/uwb/*', '--topics', 'odom')
@@ -154,7 +154,7 @@ def test_record_chosen_topics_leaves_out_others(record, probe):  # noqa: F811
         assert {topic.name for topic in reader.topics} == {'/odom', '/uwb/exchanges'}
 
 
-def test_record_killed_bag_is_readable(record, probe):  # noqa: F811
+def test_record_killed_bag_is_readable(record, probe):
     """A recorder that is killed loses no more than its last seconds."""
     speaker = Speaker(probe)
     recorder, folder = record()
@@ -169,7 +169,7 @@ def test_record_killed_bag_is_readable(record, probe):  # noqa: F811
     assert found == speaker.sent['/odom']
 
 
-def test_record_sim_time_stamps_with_clock(record, probe):  # noqa: F811
+def test_record_sim_time_stamps_with_clock(record, probe):
     """Under simulated time the stamps are those of /clock, also of what came before it."""
     speaker = Speaker(probe)
     clock = probe.node.create_publisher(Clock, '/clock', QoSProfile(depth=1))
@@ -190,7 +190,7 @@ def test_record_sim_time_stamps_with_clock(record, probe):  # noqa: F811
     assert stamps == [('/map_name', 100), ('/odom', 100), ('/odom', 200)]
 
 
-def test_record_existing_folder_is_refused(record, processes, tmp_path):  # noqa: F811
+def test_record_existing_folder_is_refused(record, processes, tmp_path):
     """A bag is never written over."""
     (tmp_path / 'bag').mkdir()
     recorder, _ = record()
@@ -198,7 +198,7 @@ def test_record_existing_folder_is_refused(record, processes, tmp_path):  # noqa
     assert 'exists' in recorder.output
 
 
-def test_play_bag_listener_gets_every_byte_in_order(bag, probe, processes):  # noqa: F811
+def test_play_bag_listener_gets_every_byte_in_order(bag, probe, processes):
     """All messages arrive, reliable ones and latched ones included, in the order recorded."""
     folder, sent = bag
     listener = Listener(probe)
@@ -210,7 +210,7 @@ def test_play_bag_listener_gets_every_byte_in_order(bag, probe, processes):  # n
         assert listener.heard[topic] == sent[topic], topic
 
 
-def test_play_rate_start_topics_and_remap_are_obeyed(bag, probe, processes):  # noqa: F811
+def test_play_rate_start_topics_and_remap_are_obeyed(bag, probe, processes):
     """Half the bag, one topic under a new name, and the latched past all the same."""
     folder, sent = bag
     heard: list[bytes] = []
@@ -233,7 +233,7 @@ def test_play_rate_start_topics_and_remap_are_obeyed(bag, probe, processes):  # 
     assert not listener.heard['/imu/data']
 
 
-def test_play_clock_runs_with_the_bag(bag, probe, processes):  # noqa: F811
+def test_play_clock_runs_with_the_bag(bag, probe, processes):
     """The clock goes from the first stamp to the last and is never behind by more than 30 ms."""
     folder, _ = bag
     with BagReader(folder) as reader:
@@ -255,11 +255,11 @@ def test_play_clock_runs_with_the_bag(bag, probe, processes):  # noqa: F811
     assert times == sorted(times)
     assert times[0] == start
     assert end - times[-1] < 30_000_000
-    steps = [later - earlier for earlier, later in zip(times, times[1:], strict=False)]
+    steps = [later - earlier for earlier, later in itertools.pairwise(times)]
     assert len(steps) > (end - start) / 30_000_000
 
 
-def test_play_nobody_listens_fails_in_time(bag, processes):  # noqa: F811
+def test_play_nobody_listens_fails_in_time(bag, processes):
     """Whoever has to listen and does not is named, and the exit code is 1."""
     folder, _ = bag
     player = processes.start(*COMMAND, 'play', folder, '--wait-for', '/odom', '--wait-limit', '1')
@@ -275,7 +275,7 @@ def test_play_nobody_listens_fails_in_time(bag, processes):  # noqa: F811
         (('nowhere', '--remap', 'odom=other'), 'OLD:=NEW'),
     ],
 )
-def test_play_bad_input_is_refused(processes, arguments, words):  # noqa: F811
+def test_play_bad_input_is_refused(processes, arguments, words):
     """What cannot be used is said in one line, with exit code 2."""
     player = processes.start(*COMMAND, 'play', *arguments)
     assert player.wait() == 2

@@ -1,0 +1,106 @@
+"""From a scenario to ROS parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tablerunner.config import Document, build
+from tablerunner.estimation import LocalizerConfig
+from tablerunner.odometry import OdometerConfig
+from tablerunner.scenario import Scenario, load_scenario
+from tablerunner.uwb import PositionerConfig, RangerConfig
+from tablerunner_bringup import parameters
+from tablerunner_bringup.nodes import COMMANDING, NODES, nodes_of
+from tablerunner_bringup.parameter_files import CONFIGS
+from tablerunner_bringup.parameters import flat
+from tablerunner_bringup.run_options import RunOptions
+from tablerunner_ros.parameters import fields_of
+
+RESTAURANT = Path(__file__).parents[1] / 'scenarios' / 'restaurant.yaml'
+ODD = """\
+name: odd
+start: [1, 2, 3]
+anchors:
+  - {id: north, position: [0, 4, 2]}
+  - {id: south, position: [3, 0, 2]}
+robot: {wheel_radius: 0.1, track: 0.4, tag_position: [0, 0, 1]}
+"""
+
+
+@pytest.fixture
+def odd(tmp_path: Path) -> tuple[Scenario, RunOptions]:
+    """Return a scenario in which whole numbers stand where lengths are meant."""
+    path = tmp_path / 'odd.yaml'
+    path.write_text(ODD, encoding='utf-8')
+    return load_scenario(path), RunOptions(scenario=str(path), seed=7)
+
+
+@pytest.mark.parametrize('spec', NODES, ids=lambda spec: spec.name)
+def test_parameters_of_scenario_are_what_the_node_declares(spec, odd, tmp_path):
+    """Each name is declared by the node, and its type survives the way through YAML."""
+    scenario, options = odd
+    file = tmp_path / 'node.yaml'
+    parameters.write(file, spec.name, spec.parameters(scenario, options))
+    told = yaml.safe_load(file.read_text(encoding='utf-8'))[f'/**/{spec.name}']['ros__parameters']
+    assert told.pop('use_sim_time', True) is True
+    known = {field.name: field.type_ for cls in CONFIGS[spec.name] for field in fields_of(cls)}
+    wanted = {'DOUBLE': float, 'INTEGER': int, 'BOOL': bool, 'STRING': str}
+    for name, value in told.items():
+        kinds = {type(item) for item in (value if isinstance(value, list) else [value])}
+        assert kinds == {wanted[known[name].name.removesuffix('_ARRAY')]}, name
+
+
+def test_parameters_of_scenario_carry_its_values(odd):
+    """Anchors, wheels, tag and start are those of the scenario."""
+    scenario, options = odd
+    driver = flat(parameters.uwb_driver(scenario, options))
+    assert driver['anchor_ids'] == ['north', 'south']
+    assert driver['anchor_positions'] == [0.0, 4.0, 2.0, 3.0, 0.0, 2.0]
+    assert driver['tag_height'] == 1.0
+    odometry = flat(parameters.odom_node(scenario, options))
+    assert (odometry['wheels.wheel_radius'], odometry['wheels.track']) == (0.1, 0.4)
+    fusion = flat(parameters.fusion_node(scenario, options))
+    assert fusion['initial_pose'] == [1.0, 2.0, 3.0]
+    assert fusion['tag_position'] == [0.0, 0.0, 1.0]
+    assert flat(parameters.sim_bridge(scenario, options))['seed'] == 7
+
+
+def test_parameters_of_restaurant_make_configs():
+    """The core accepts them: no value is out of its bounds."""
+    scenario, options = load_scenario(RESTAURANT), RunOptions(scenario=str(RESTAURANT))
+    driver = parameters.uwb_driver(scenario, options)
+    build(RangerConfig, Document({n: driver[n] for n in ('anchor_ids', 'anchor_positions')}))
+    build(PositionerConfig, Document({'tag_height': driver['tag_height']}))
+    odometry = parameters.odom_node(scenario, options)
+    build(OdometerConfig, Document({'wheels': odometry['wheels']}))
+    fusion = parameters.fusion_node(scenario, options)
+    del fusion['use_sim_time']
+    build(LocalizerConfig, Document(fusion))
+
+
+def test_parameters_unknown_start_tells_no_pose(odd):
+    """A robot that is to find itself is not told where it is."""
+    scenario, options = odd
+    found = parameters.fusion_node(scenario, options.replace(unknown_start=True))
+    assert 'initial_pose' not in found
+
+
+def test_parameters_real_robot_uses_system_time(odd):
+    """Without a simulation there is no /clock to wait for, and no sim_bridge."""
+    scenario, options = odd
+    real = options.replace(simulated=False)
+    specs = nodes_of(real)
+    assert 'sim_bridge' not in {spec.name for spec in specs}
+    assert COMMANDING in {spec.name for spec in specs}
+    assert not any(spec.parameters(scenario, real)['use_sim_time'] for spec in specs)
+
+
+def test_parameters_empty_list_is_left_out(tmp_path):
+    """ROS cannot tell the type of an empty list in a file."""
+    file = tmp_path / 'node.yaml'
+    parameters.write(file, 'node', {'anchors': [], 'wheels': {'names': [], 'radius': 0.1}})
+    told = yaml.safe_load(file.read_text(encoding='utf-8'))
+    assert told == {'/**/node': {'ros__parameters': {'wheels.radius': 0.1}}}
