@@ -21,7 +21,6 @@ _ARC_POINTS = 7
 _FUTURE_S = 0.1  # clocks of two machines may differ by this
 _CLOSING_M_S = 0.25  # several times what the noise of two readings makes of a thing at rest
 _WALKING_M_S = 2.5  # faster than anybody walks in a room: another thing than before
-_NOISE_M = 0.02
 _COMPARE_S = 0.5  # readings farther apart are not compared
 _SIDE_RAD = math.radians(60.0)
 
@@ -172,12 +171,12 @@ class EchoMemory:
         now_m = float(np.linalg.norm(points[0] - place))
         # The nearest point of the old arc: where in the cone the echo came from is not known.
         before_m = float(np.min(np.linalg.norm(last.points - place, axis=1)))
-        speed = (before_m - now_m - _NOISE_M) / apart_s
+        speed = (before_m - now_m) / apart_s
         if speed > _WALKING_M_S:
             return math.inf
-        # A thing at rest that stands at a slant to the way seems to come nearer, too: at 45
-        # degrees as fast as the robot passes it.
-        passing = abs(self._motion.linear_m_s * math.sin(mount.heading))
+        # A flat thing at rest that stands at a slant to the way seems to come nearer, too: to a
+        # side sensor as fast as the robot passes it, to those between the less.
+        passing = abs(self._motion.linear_m_s) * math.sin(mount.heading) ** 2
         sweeping = abs(self._motion.angular_rad_s) * before_m
         return max(speed - passing - sweeping, 0.0)
 

@@ -305,6 +305,9 @@ class SafetyStop:
         beside = largest_speed(
             gaps * _SLANT - config.side_margin, config.delay, config.deceleration
         )
+        # What has just appeared close beside may step into the way at once.
+        sudden = heard.closing & (gaps < 0.5 * config.near)
+        beside = np.where(sudden, 0.0, beside)
         beside = np.maximum(beside, config.creep_speed)
         speeds = np.minimum(speeds, np.where(heard.beside, beside, np.inf))
         best = int(np.argmin(speeds))

@@ -1,0 +1,196 @@
+"""Rooms and closed loops for the tests of control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tablerunner.control import (
+    FollowerConfig,
+    Localisation,
+    Mission,
+    MissionConfig,
+    MissionStatus,
+    Planner,
+    PurePursuit,
+    SafetyConfig,
+    SafetyDecision,
+    SafetyStop,
+    Situation,
+    VelocityLimits,
+    home_of,
+    limits_within,
+    make_planner,
+    sensor_mounts,
+)
+from tablerunner.geometry.pose import Pose2
+from tablerunner.scenario import Person, Scenario, Wall, load_scenario
+from tablerunner.simulation import Contact, Simulator, Truth
+from tablerunner.types import UltrasonicSample, Velocity
+
+SCENARIOS = Path(__file__).parents[3] / 'tablerunner_bringup' / 'scenarios'
+
+
+@dataclass
+class Loop:
+    """A simulated robot under a safety stop, driven by whatever asks for a velocity at 20 Hz."""
+
+    scenario: Scenario
+    seed: int
+    start: Pose2 | None = None
+    position_noise_m: float = 0.0
+    safety_config: SafetyConfig | None = None
+    simulator: Simulator = field(init=False)
+    safety: SafetyStop = field(init=False)
+    contacts: list[Contact] = field(default_factory=list)
+    decision: SafetyDecision | None = None
+    top_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        robot = self.scenario.robot
+        self.simulator = Simulator(self.scenario, self.seed, self.start)
+        self.limits = limits_within(VelocityLimits(), robot.limits)
+        config = self.safety_config or SafetyConfig()
+        self.safety = SafetyStop(
+            config.replace(footprint_radius=robot.footprint_radius),
+            self.limits,
+            sensor_mounts(robot),
+        )
+        self.random = np.random.default_rng(self.seed)
+        self.offset = np.zeros(3)
+
+    def pose(self) -> Pose2:
+        """Return the true pose with an error that walks slowly."""
+        true = self.simulator.truth.pose
+        if self.position_noise_m:
+            sigma = np.array([self.position_noise_m, self.position_noise_m, 0.03])
+            # First-order Gauss-Markov, 1 s, at 20 Hz.
+            self.offset = 0.95 * self.offset + 0.31 * sigma * self.random.standard_normal(3)
+        return Pose2(
+            true.x + self.offset[0], true.y + self.offset[1], true.heading + self.offset[2]
+        )
+
+    def run(self, controller: Callable[[int, Pose2], Velocity | None], limit_s: float) -> bool:
+        """Drive until the controller returns None; return whether it did."""
+        simulator = self.simulator
+        command: Velocity | None = None
+        for step in range(int(limit_s * 100)):
+            for sample in simulator.step(command):
+                if isinstance(sample, Contact):
+                    self.contacts.append(sample)
+                elif isinstance(sample, UltrasonicSample):
+                    assert self.safety.add_reading(sample, simulator.now_ns) is None
+                elif isinstance(sample, Truth):
+                    self.top_speed = max(self.top_speed, abs(sample.linear_m_s))
+            command = None
+            if step % 5 == 4:
+                now = simulator.now_ns
+                wanted = controller(now, self.pose())
+                if wanted is None:
+                    return True
+                truth = simulator.truth
+                self.decision = self.safety.step(
+                    now,
+                    wanted,
+                    now,
+                    Localisation(now, 0.05, 0.05),
+                    Velocity(truth.linear_m_s, truth.angular_rad_s),
+                )
+                command = self.decision.velocity
+        return False
+
+    @property
+    def faults(self) -> list[Contact]:
+        """The touches that the robot has to answer for."""
+        return [contact for contact in self.contacts if contact.robot_at_fault]
+
+
+@dataclass
+class Delivery:
+    """A mission in a `Loop`."""
+
+    loop: Loop
+    planner: Planner
+    config: MissionConfig = field(default_factory=MissionConfig)
+    statuses: list[MissionStatus] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        controller = PurePursuit(FollowerConfig(), self.loop.limits)
+        home = home_of(self.loop.scenario)
+        self.mission = Mission(self.config, self.planner, controller, home)
+
+    def step(self, now: int, pose: Pose2) -> Velocity | None:
+        """Advance the mission; None when it is over."""
+        decision = self.loop.decision
+        situation = Situation(
+            now,
+            pose,
+            now,
+            0.05,
+            0.05,
+            decision is not None and decision.blocked and decision.velocity.linear_m_s == 0.0,
+            None if decision is None else decision.obstacle,
+        )
+        velocity, status = self.mission.step(situation)
+        self.statuses.append(status)
+        self.events.extend(f'{now / 1e9:.1f} {event}' for event in status.events)
+        return None if status.state.is_final else velocity
+
+
+@pytest.fixture(scope='session')
+def restaurant() -> Scenario:
+    """Return the restaurant of the demo."""
+    return load_scenario(SCENARIOS / 'restaurant.yaml')
+
+
+@pytest.fixture(scope='session')
+def restaurant_planner(restaurant: Scenario) -> Planner:
+    """Return a planner of the restaurant; making its floor takes a moment."""
+    return make_planner(restaurant)
+
+
+@pytest.fixture
+def make_loop() -> type[Loop]:
+    """Return the closed loop around the simulator."""
+    return Loop
+
+
+@pytest.fixture
+def make_delivery() -> type[Delivery]:
+    """Return the closed loop around a mission."""
+    return Delivery
+
+
+@pytest.fixture
+def hall() -> Callable[[int, float], Scenario]:
+    """Return a maker of rooms of 10 m x 8 m, bare but for six people."""
+
+    def make(seed: int, yield_probability: float) -> Scenario:
+        random = np.random.default_rng(seed)
+        people = tuple(
+            Person(
+                name=f'person {number}',
+                route=tuple(
+                    (float(random.uniform(0.6, 9.4)), float(random.uniform(0.6, 7.4)))
+                    for _ in range(3)
+                ),
+                speed=float(random.uniform(0.4, 1.2)),
+                yield_probability=yield_probability,
+                start_share=float(random.uniform(0.0, 1.0)),
+            )
+            for number in range(6)
+        )
+        corners = ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0), (0.0, 8.0))
+        return Scenario(
+            name='hall',
+            walls=(Wall(name='wall', closed=True, points=corners),),
+            people=people,
+            start=(5.0, 4.0, float(random.uniform(-3.1, 3.1))),
+        )
+
+    return make

@@ -1,0 +1,381 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tablerunner.control import (
+    Destination,
+    Disc,
+    FloorMap,
+    FollowerConfig,
+    Mission,
+    MissionConfig,
+    MissionState,
+    MissionStatus,
+    Planner,
+    PurePursuit,
+    Situation,
+    VelocityLimits,
+)
+from tablerunner.errors import MissionError, PlanningError
+from tablerunner.geometry.angles import wrap
+from tablerunner.geometry.pose import Pose2
+from tablerunner.geometry.segments import polygon_edges
+from tablerunner.types import Velocity, nanoseconds
+
+WALLS = polygon_edges(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]))
+PLANNER = Planner(FloorMap.build(WALLS), 0.25)
+HOME = Destination('kitchen', Pose2(1.0, 1.0, 0.0))
+TABLE = Destination('table_1', Pose2(6.0, 4.0, 1.5), wait_s=2.0)
+SECOND = Destination('table_2', Pose2(2.0, 5.0, 0.0))
+CLOSED = polygon_edges(np.array([[5.0, 3.0], [7.5, 3.0], [7.5, 5.5], [5.0, 5.5]]))
+DT = 0.05
+
+
+class World:
+    """An ideal robot in an empty room; a person may stand in its way and hold it."""
+
+    def __init__(self, planner: Planner = PLANNER, config: MissionConfig | None = None) -> None:
+        controller = PurePursuit(FollowerConfig(), VelocityLimits())
+        self.mission = Mission(config or MissionConfig(), planner, controller, HOME)
+        self.pose = Pose2(1.0, 1.0, 0.0)
+        self.now_s = 1.0
+        self.person: Disc | None = None
+        self.localised = True
+        self.position_std, self.heading_std = 0.05, 0.05
+        self.held = False
+        self.states: list[MissionState] = []
+        self.events: list[str] = []
+        self.velocity = Velocity()
+
+    def step(self) -> MissionStatus:
+        """Advance by one control step."""
+        self.now_s += DT
+        now = nanoseconds(self.now_s)
+        obstacle = self._ahead()
+        situation = Situation(
+            now,
+            self.pose if self.localised else None,
+            now if self.localised else 0,
+            self.position_std,
+            self.heading_std,
+            obstacle is not None,
+            obstacle,
+            self.held,
+        )
+        self.velocity, status = self.mission.step(situation)
+        linear = 0.0 if obstacle is not None or self.held else self.velocity.linear_m_s
+        turn = 0.0 if self.held else self.velocity.angular_rad_s * DT
+        course = self.pose.heading + turn / 2
+        self.pose = Pose2(
+            self.pose.x + linear * DT * math.cos(course),
+            self.pose.y + linear * DT * math.sin(course),
+            wrap(self.pose.heading + turn),
+        )
+        self.states.append(status.state)
+        self.events.extend(status.events)
+        return status
+
+    def _ahead(self) -> tuple[float, float] | None:
+        if self.person is None:
+            return None
+        seen = self.pose.between(Pose2(self.person.x, self.person.y, 0.0))
+        gap = math.hypot(seen.x, seen.y) - self.person.radius - 0.25
+        if gap > 0.25 or abs(math.atan2(seen.y, seen.x)) > 0.8:
+            return None
+        share = 1.0 - self.person.radius / math.hypot(seen.x, seen.y)
+        return seen.x * share, seen.y * share
+
+    def run(self, limit_s: float = 200.0) -> MissionStatus:
+        """Go on until the mission is over."""
+        for _ in range(int(limit_s / DT)):
+            status = self.step()
+            if status.state.is_final:
+                return status
+        raise AssertionError(f'still {status.state.value} after {limit_s} s: {self.events}')
+
+    def until(self, state: MissionState, limit_s: float = 60.0) -> MissionStatus:
+        """Go on until the mission is in a state."""
+        for _ in range(int(limit_s / DT)):
+            status = self.step()
+            if status.state is state:
+                return status
+        raise AssertionError(f'never {state.value}: {self.events}')
+
+
+def test_delivery_reaches_its_stops_waits_and_comes_home() -> None:
+    world = World()
+    world.mission.start((TABLE, SECOND), return_home=True)
+    status = world.run()
+    assert status.state is MissionState.DONE
+    assert status.reached == ('table_1', 'table_2', 'kitchen')
+    assert status.missed == ()
+    assert status.message == '3 of 3 stops reached'
+    assert world.states.count(MissionState.WAITING) == pytest.approx(2.0 / DT, abs=3)
+    assert MissionState.RETURNING in world.states
+    assert math.hypot(world.pose.x - 1.0, world.pose.y - 1.0) < 0.25
+    assert world.pose.heading == pytest.approx(0.0, abs=0.15)
+
+
+def test_distance_left_falls_to_zero() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    left = []
+    while not (status := world.step()).state.is_final:
+        if status.state is MissionState.DRIVING:
+            left.append(status.distance_left)
+    assert left[0] == pytest.approx(math.dist((1, 1), (6, 4)), rel=0.1)
+    assert left[-1] < 0.3
+    assert max(np.diff(left)) < 0.1
+
+
+def test_idle_mission_stands() -> None:
+    world = World()
+    for _ in range(10):
+        assert world.step().state is MissionState.IDLE
+        assert world.velocity == Velocity()
+
+
+def test_second_mission_is_refused_while_busy() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    world.step()
+    with pytest.raises(MissionError, match='busy'):
+        world.mission.start((SECOND,))
+    world.run()
+    world.mission.start((SECOND,))
+    assert world.run().reached == ('table_2',)
+
+
+@pytest.mark.parametrize(
+    ('stops', 'words'),
+    [
+        ((), 'at least one stop'),
+        ((Destination('x', Pose2(2.0, 2.0), -1.0),), 'x: the wait'),
+        ((Destination('x', Pose2(2.0, 2.0), math.nan),), 'x: the wait'),
+    ],
+)
+def test_mission_without_sense_is_refused(stops: tuple[Destination, ...], words: str) -> None:
+    world = World()
+    with pytest.raises(MissionError, match=words):
+        world.mission.start(stops)
+    assert not world.mission.is_busy
+
+
+@pytest.mark.parametrize(
+    ('pose', 'words'),
+    [
+        (Pose2(20.0, 2.0), 'outside the room'),
+        (Pose2(0.1, 2.0), 'from an obstacle'),
+        (Pose2(math.nan, 2.0), 'not a finite'),
+    ],
+)
+def test_mission_to_bad_pose_is_refused_by_name(pose: Pose2, words: str) -> None:
+    world = World()
+    with pytest.raises(PlanningError, match=f'table_9: .*{words}'):
+        world.mission.start((TABLE, Destination('table_9', pose)))
+    assert not world.mission.is_busy
+
+
+@pytest.mark.parametrize(
+    'state',
+    [
+        MissionState.PLANNING,
+        MissionState.DRIVING,
+        MissionState.WAITING,
+        MissionState.RETURNING,
+        MissionState.BLOCKED,
+        MissionState.LOCALISING,
+        MissionState.ALIGNING,
+        MissionState.HELD,
+    ],
+)
+def test_cancel_in_each_state_stops_and_names_what_is_missed(state: MissionState) -> None:
+    world = World()
+    world.mission.start((TABLE,), return_home=True)
+    if state is MissionState.LOCALISING:
+        world.localised = False
+    elif state is MissionState.ALIGNING:
+        world.heading_std = 2.0
+    elif state is MissionState.HELD:
+        world.held = True
+    elif state is MissionState.BLOCKED:
+        world.person = Disc(3.5, 2.5, 0.3)
+    if state is not MissionState.PLANNING:
+        world.until(state)
+    world.mission.cancel()
+    status = world.step()
+    assert status.state is MissionState.CANCELLED
+    names = [name for name, _ in status.missed]
+    reached = state in (MissionState.WAITING, MissionState.RETURNING)
+    assert names == (['kitchen'] if reached else ['table_1', 'kitchen'])
+    assert all(reason == 'cancelled' for _, reason in status.missed)
+    for _ in range(30):
+        world.step()
+    assert world.velocity == Velocity()
+    world.localised, world.heading_std, world.held, world.person = True, 0.05, False, None
+    world.mission.start((SECOND,))
+    assert world.run().state is MissionState.DONE
+
+
+def test_person_who_goes_away_is_waited_for() -> None:
+    """Wait first: nothing is planned around somebody who leaves within a few seconds."""
+    world = World()
+    world.mission.start((TABLE,))
+    world.person = Disc(3.5, 2.5, 0.3)
+    world.until(MissionState.BLOCKED)
+    world.person = None
+    status = world.run()
+    assert status.state is MissionState.DONE
+    assert not any('around' in event for event in world.events)
+
+
+def test_person_who_stays_is_driven_around() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    world.person = Disc(3.5, 2.5, 0.3)
+    status = world.run()
+    assert status.state is MissionState.DONE
+    assert any('a way around' in event for event in world.events)
+
+
+def test_way_blocked_for_long_is_given_up_and_the_next_stop_served() -> None:
+    """In a corridor nobody can be driven around: the stop is missed with its reason."""
+    parts = np.array([[[4.0, 0.0], [4.0, 2.5]], [[4.0, 3.4], [4.0, 6.0]]])
+    planner = Planner(FloorMap.build(np.concatenate([WALLS, parts])), 0.25)
+    config = MissionConfig(give_up_after=20.0)
+    world = World(planner, config)
+    world.mission.start((TABLE, SECOND), return_home=True)
+    world.person = Disc(4.0, 2.95, 0.3)
+    status = world.run()
+    assert status.state is MissionState.FAILED
+    assert status.reached == ('table_2', 'kitchen')
+    assert status.missed[0][0] == 'table_1'
+    assert 'blocked for 2' in status.missed[0][1]
+    assert 'table_1' in status.message
+
+
+def test_unreachable_stop_is_missed_with_its_reason() -> None:
+    planner = Planner(FloorMap.build(np.concatenate([WALLS, CLOSED])), 0.25)
+    world = World(planner)
+    world.mission.start((TABLE, SECOND))
+    status = world.run()
+    assert status.reached == ('table_2',)
+    assert status.missed[0][0] == 'table_1'
+    assert 'no way leads' in status.missed[0][1]
+
+
+def test_stop_not_reached_in_time_is_missed() -> None:
+    world = World(config=MissionConfig(stop_limit=3.0))
+    world.mission.start((TABLE,))
+    status = world.run()
+    assert status.missed == (('table_1', 'not reached within 3 s'),)
+
+
+def test_unlocalised_robot_waits_and_goes_on_when_it_is_found() -> None:
+    world = World()
+    world.localised = False
+    world.mission.start((TABLE,))
+    for _ in range(100):
+        assert world.step().state is MissionState.LOCALISING
+        assert world.velocity == Velocity()
+    world.localised = True
+    assert world.run().state is MissionState.DONE
+
+
+def test_robot_that_is_lost_on_the_way_comes_to_a_stand() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    for _ in range(60):
+        world.step()
+    assert world.velocity.linear_m_s > 0.4
+    world.localised = False
+    for _ in range(30):
+        world.step()
+    assert world.velocity == Velocity()
+    world.localised = True
+    assert world.run().state is MissionState.DONE
+
+
+def test_old_pose_counts_as_not_localised() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    world.step()
+    now = nanoseconds(world.now_s + 5.0)
+    old = now - nanoseconds(1.5)
+    _, status = world.mission.step(Situation(now, world.pose, old, 0.05, 0.05))
+    assert status.state is MissionState.LOCALISING
+
+
+def test_unknown_heading_is_found_by_driving_gently() -> None:
+    """Position known, heading not: after a wait a slow arc, and on when the heading is known."""
+    world = World()
+    world.heading_std = 1.8
+    world.mission.start((TABLE,))
+    world.until(MissionState.ALIGNING)
+    assert world.now_s - 1.0 >= MissionConfig().align_after - 0.1
+    for _ in range(40):
+        world.step()
+        assert 0.0 < world.velocity.linear_m_s <= MissionConfig().align_speed
+    world.heading_std = 0.5  # better, but not good enough to end the search
+    assert world.step().state is MissionState.ALIGNING
+    world.heading_std = 0.1
+    assert world.run().state is MissionState.DONE
+
+
+def test_search_for_heading_turns_where_something_is_in_the_way() -> None:
+    world = World()
+    world.heading_std = 1.8
+    world.mission.start((TABLE,))
+    world.person = Disc(1.6, 1.0, 0.2)
+    world.until(MissionState.ALIGNING)
+    assert world.velocity.linear_m_s == 0.0
+    assert world.velocity.angular_rad_s > 0.0
+
+
+def test_mission_ends_when_the_robot_is_never_localised() -> None:
+    world = World(config=MissionConfig(localise_limit=5.0))
+    world.localised = False
+    world.mission.start((TABLE,), return_home=True)
+    status = world.run()
+    assert status.state is MissionState.FAILED
+    assert [name for name, _ in status.missed] == ['table_1', 'kitchen']
+    assert 'not localised for 5 s' in status.message
+
+
+def test_emergency_stop_is_no_blocked_way() -> None:
+    """Held for a minute the mission neither plans around anything nor gives up."""
+    world = World()
+    world.mission.start((TABLE,))
+    for _ in range(40):
+        world.step()
+    world.held = True
+    for _ in range(1200):
+        assert world.step().state is MissionState.HELD
+    world.held = False
+    assert world.run().state is MissionState.DONE
+
+
+def test_robot_pushed_off_its_path_plans_anew() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    for _ in range(60):
+        world.step()
+    world.pose = Pose2(1.0, 5.0, 0.0)
+    assert world.run().state is MissionState.DONE
+    assert any('off the path' in event for event in world.events)
+
+
+def test_mission_is_deterministic() -> None:
+    """The same inputs in the same order: the same velocities, bit for bit."""
+    runs = []
+    for _ in range(2):
+        world = World()
+        world.mission.start((TABLE, SECOND), return_home=True)
+        velocities = []
+        while not world.step().state.is_final:
+            velocities.append(world.velocity)
+        runs.append(velocities)
+    assert runs[0] == runs[1]
