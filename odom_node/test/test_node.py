@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +15,7 @@ from sensor_msgs.msg import Imu, JointState
 from tf2_msgs.msg import TFMessage
 
 from odom_node.node import OdomNode
+from tablerunner.errors import ConfigError
 from tablerunner.types import ImuSample, WheelSample
 from tablerunner_ros.conversions.imu import imu_to_message
 from tablerunner_ros.conversions.quaternion import heading_from_quaternion
@@ -243,19 +245,26 @@ def test_odom_parameter_changed_while_it_runs(wheels: Wheels) -> None:
 @pytest.mark.parametrize(
     ('parameters', 'words'),
     [
-        ({'wheels': {'track': -1.0}}, 'wheels.track: got -1.0, expected a number above 0'),
+        ({'wheels.track': -1.0}, 'wheels.track: got -1.0, expected a number above 0'),
         ({'heading_source': 'stars'}, "heading_source: got 'stars', expected one of wheels, gyro"),
         ({'left_joint': 3}, 'left_joint: got 3, expected text'),
     ],
 )
-def test_odom_bad_parameter_file_exits_2_with_one_sentence(
-    processes: Processes, parameters: dict[str, Any], words: str
-) -> None:
-    """The sentence names node, parameter, value and what was expected."""
-    process = processes.node('odom_node', 'odom_node', parameters)
+def test_odom_bad_parameter_is_named(probe: Probe, parameters: dict[str, Any], words: str) -> None:
+    """The error names node, parameter, value and what was expected."""
+    given = [Parameter(name, value=value) for name, value in parameters.items()]
+    with pytest.raises(ConfigError, match=re.escape(f'parameters of /odom_node: {words}')):
+        OdomNode(context=probe.context, parameter_overrides=given)
+
+
+def test_odom_bad_parameter_file_exits_2_with_one_sentence(processes: Processes) -> None:
+    """That error is all that the process says."""
+    process = processes.node('odom_node', 'odom_node', {'wheels': {'track': -1.0}})
     assert process.wait() == 2
     assert len(process.output.splitlines()) == 1
-    assert process.output.startswith(f'parameters of /odom_node: {words}')
+    assert process.output.startswith(
+        'parameters of /odom_node: wheels.track: got -1.0, expected a number above 0'
+    )
 
 
 def test_odom_process_in_a_namespace_works_and_ends_cleanly(

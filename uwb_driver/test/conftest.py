@@ -1,5 +1,12 @@
 """Fixtures for tests over DDS."""
 
-from tablerunner_ros.testing.fixtures import domain, probe, processes
+import pytest
 
-__all__ = ['domain', 'probe', 'processes']
+from tablerunner_ros.testing.fixtures import domain, probe, processes, quick_diagnostics
+
+__all__ = ['domain', 'probe', 'processes', 'quick_diagnostics']
+
+
+@pytest.fixture(autouse=True)
+def _quick(quick_diagnostics: None) -> None:
+    """Report often, in every test of this node."""

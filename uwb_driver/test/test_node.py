@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 import time
 from collections.abc import Callable
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.parameter import Parameter
 
+from tablerunner.errors import ConfigError
 from tablerunner.types import UNKNOWN_YAW_VARIANCE, ExchangeSample
 from tablerunner.uwb import ranging
 from tablerunner_interfaces.msg import UwbAnchorArray, UwbExchange, UwbRange
@@ -233,14 +235,21 @@ def test_driver_parameter_changed_while_it_runs(driver: Driver) -> None:
         ({'tag_height': float('nan')}, 'tag_height: got nan, expected a finite number'),
     ],
 )
-def test_driver_bad_parameter_file_exits_2_with_one_sentence(
-    processes: Processes, changes: dict[str, Any], words: str
-) -> None:
-    """The sentence names node, parameter, value and what was expected."""
-    process = processes.node('uwb_driver', 'uwb_driver', {**PARAMETERS, **changes})
+def test_driver_bad_parameter_is_named(probe: Probe, changes: dict[str, Any], words: str) -> None:
+    """The error names node, parameter, value and what was expected."""
+    given = [Parameter(name, value=value) for name, value in {**PARAMETERS, **changes}.items()]
+    with pytest.raises(ConfigError, match=re.escape(f'parameters of /uwb_driver: {words}')):
+        UwbDriver(context=probe.context, parameter_overrides=given)
+
+
+def test_driver_bad_parameter_file_exits_2_with_one_sentence(processes: Processes) -> None:
+    """That error is all that the process says."""
+    process = processes.node('uwb_driver', 'uwb_driver', {**PARAMETERS, 'range_std': 'wide'})
     assert process.wait() == 2
     assert len(process.output.splitlines()) == 1
-    assert process.output.startswith(f'parameters of /uwb_driver: {words}')
+    assert process.output.startswith(
+        "parameters of /uwb_driver: range_std: got 'wide', expected a finite number above 0"
+    )
 
 
 def test_driver_process_works_and_ends_cleanly(probe: Probe, processes: Processes) -> None:

@@ -33,3 +33,9 @@ def processes(domain: int, tmp_path: Path) -> Iterator[Processes]:
     item = Processes(domain, tmp_path)
     yield item
     item.close()
+
+
+@pytest.fixture
+def quick_diagnostics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let nodes in this process report ten times a second, so that tests wait less."""
+    monkeypatch.setattr('tablerunner_ros.diagnostics.PERIOD_S', 0.1)

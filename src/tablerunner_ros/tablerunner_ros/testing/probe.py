@@ -21,6 +21,9 @@ from tablerunner_ros.testing.waiting import LIMIT_S
 
 T = TypeVar('T')
 
+DEPTH = 1000
+"""Queue of what a probe listens to: a busy machine must not make a test lose messages."""
+
 
 class Probe:
     """Speaks and listens in one domain; everything runs in the calling thread, while it waits.
@@ -56,9 +59,9 @@ class Probe:
         """Subscribe to a topic of the contract; return the list that its messages are put into."""
         if topic not in self._received:
             self._received[topic] = []
-            self.node.create_subscription(
-                type_, topic, self._received[topic].append, qos_for(topic, subscriber=True)
-            )
+            profile = qos_for(topic, subscriber=True)
+            profile.depth = DEPTH
+            self.node.create_subscription(type_, topic, self._received[topic].append, profile)
         return self._received[topic]
 
     def speak(self, type_: type[Any], topic: str) -> Publisher:
