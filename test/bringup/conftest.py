@@ -11,12 +11,12 @@ import pytest
 from nav_msgs.msg import Odometry
 
 from tablerunner_bringup.nodes import NODES
-from tablerunner_ros.testing.fixtures import domain, probe
+from tablerunner_ros.testing.fixtures import domain, probe, processes
 from tablerunner_ros.testing.probe import Probe
 from tablerunner_ros.testing.process import Process
 from tablerunner_ros.testing.waiting import wait_for
 
-__all__ = ['domain', 'probe']
+__all__ = ['domain', 'probe', 'processes']
 
 ROOM = """\
 name: room

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import sys
+
 import pytest
 import yaml
 
@@ -59,3 +62,35 @@ def test_launch_namespace_delivers(start, room, domain):
         domain=domain,
     )
     assert run.wait_end(120.0) == 0, run.process.output
+
+
+def demo(processes, room, folder, *arguments):
+    """Run the demo to its end; return exit code, output and errors.json."""
+    process = processes.start(
+        *(sys.executable, '-m', 'tablerunner.cli.main', 'demo', '--scenario', room),
+        *('--table', 'table_1', '-o', folder, '--domain', str(processes.domain), *arguments),
+    )
+    code = process.wait(150.0)
+    return code, process.output, json.loads((folder / 'errors.json').read_text(encoding='utf-8'))
+
+
+def test_demo_writes_bag_picture_and_errors(processes, room, tmp_path):
+    """The three results are there, and the error is that of a robot that knows where it is."""
+    folder = tmp_path / 'demo'
+    code, said, errors = demo(processes, room, folder)
+    assert code == 0, said
+    assert errors['delivered'] is True
+    assert errors['reached'] == ['table_1', 'kitchen']
+    assert errors['position_error']['compared'] > 500
+    assert errors['position_error']['rmse'] < 0.25
+    assert (folder / 'trip.png').read_bytes().startswith(b'\x89PNG')
+    with BagReader(folder / 'bag') as bag:
+        assert not bag.damage
+
+
+def test_demo_out_of_time_fails_and_says_so(processes, room, tmp_path):
+    """A meal that is late is not delivered."""
+    code, said, errors = demo(processes, room, tmp_path / 'demo', '--time-limit', '4')
+    assert code == 1
+    assert 'took too long' in said
+    assert errors['delivered'] is False

@@ -88,6 +88,9 @@ def demo(
     scenario: _Scenario = None,
     seed: _Seed = 1,
     table: Annotated[str, typer.Option(help='Where the meal goes.')] = 'table_3',
+    time_limit: Annotated[
+        float, typer.Option(min=1.0, help='Simulated seconds within which it must be done.')
+    ] = 240.0,
     unknown_start: _UnknownStart = False,
     estimator: _Estimator = 'ekf',
     real_time_factor: _Factor = 1.0,
@@ -106,6 +109,7 @@ def demo(
     options = DemoOptions(
         _run_options(scenario, seed, unknown_start, estimator, real_time_factor),
         table,
+        limit_s=time_limit,
         output=output,
         domain=domain,
     )

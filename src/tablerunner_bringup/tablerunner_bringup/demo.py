@@ -132,7 +132,6 @@ def scenario_home(scenario: Scenario) -> str:
 
 def _drive(session: Session, options: DemoOptions, progress: Progress) -> Trip | None:
     """Start everything, deliver, end everything; None when there is no trip to judge."""
-    wall_limit_s = options.wall_limit_s
     try:
         with session:
             outcome = deliver(
@@ -141,7 +140,7 @@ def _drive(session: Session, options: DemoOptions, progress: Progress) -> Trip |
                 options.wait_s,
                 return_home=True,
                 progress=progress,
-                limits=Limits(options.limit_s, wall_limit_s),
+                limits=Limits(options.limit_s, options.wall_limit_s),
             )
             monitor = session.monitor
             return Trip(
