@@ -49,4 +49,4 @@ def largest_speed(
     room = np.maximum(way - approach * np.float64(delay), 0.0)
     wait = delay + approach / np.float64(deceleration)
     root = np.sqrt(wait**2 + 2.0 * room / deceleration)
-    return np.maximum(deceleration * (root - wait), 0.0)
+    return np.asarray(np.maximum(deceleration * (root - wait), 0.0))
