@@ -120,14 +120,6 @@ class Monitor:
         """Return whether a node is on the graph and has reported on diagnostics."""
         return name in self._node.get_node_names() and name in self.statuses
 
-    def states(self) -> list[str]:
-        """Return in words what nodes complain about."""
-        return [
-            f'{status.name}: {status.message}'
-            for status in self.statuses.values()
-            if status.level >= DiagnosticStatus.ERROR
-        ]
-
 
 def _movement(message: Odometry | None) -> Movement | None:
     if message is None:

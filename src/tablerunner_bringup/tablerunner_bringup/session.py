@@ -240,10 +240,6 @@ class Session:
             time.sleep(_TICK_S)
         return False
 
-    def pids(self) -> dict[str, int]:
-        """Return the process id of each process that runs."""
-        return {name: self._supervisor.pid(name) for name in self._supervisor.running}
-
     # -- end ----------------------------------------------------------------------------------
 
     def _stand_still(self) -> None:
@@ -266,10 +262,6 @@ class Session:
                 return
             time.sleep(_TICK_S)
 
-    def close_bag(self) -> None:
-        """End the recorder before the nodes, so that the bag can be read."""
-        self._supervisor.stop([RECORDER], lambda: self._interrupts.insisted)
-
     def __exit__(
         self,
         kind: type[BaseException] | None,
@@ -277,6 +269,7 @@ class Session:
         trace: TracebackType | None,
     ) -> None:
         try:
+            self._progress.show('ending')
             if self._supervisor.running:
                 if hasattr(self, 'monitor'):
                     self._stand_still()
