@@ -3,8 +3,10 @@
 rclpy's SingleThreadedExecutor builds a wait set of every entity anew for each message, wraps each
 callback in coroutines and a task, and wakes itself twice more per callback, each time building
 the wait set again. `LeanExecutor` keeps one wait set until the entities change and calls
-subscriptions and timers directly. Everything rarer (services, clients, actions, QoS events,
-coroutines and tasks) it leaves to the code of rclpy that it inherits. Measurements: docs/nodes.md.
+subscriptions and timers directly. Everything rarer (services, clients, actions, coroutines and
+tasks) it leaves to the code of rclpy that it inherits. The events of publishers and subscriptions
+(a peer asks for another QoS), one or two for each of them, do not wake it: it looks at them once
+a second. Measurements: docs/nodes.md.
 
 It stands on internals of rclpy 7.1 (Jazzy); `make_executor` takes rclpy's own executor where they
 are missing.
@@ -13,10 +15,12 @@ are missing.
 from __future__ import annotations
 
 import inspect
+import time
 from contextlib import ExitStack
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -24,6 +28,8 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 FOREVER_NS = -1
+EVENTS_EVERY_S = 1.0
+"""How often the events of publishers and subscriptions are looked at, at the soonest."""
 
 
 class LeanExecutor(SingleThreadedExecutor):
@@ -32,6 +38,7 @@ class LeanExecutor(SingleThreadedExecutor):
     def __init__(self, *, context: Context | None = None) -> None:
         self._stale = True  # entities came or went: gather them anew
         self._held = ExitStack()  # keeps their handles alive while they are waited for
+        self._events_due = 0.0
         super().__init__(context=context)
 
     def wake(self) -> None:
@@ -56,9 +63,12 @@ class LeanExecutor(SingleThreadedExecutor):
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait for work and do what is ready; with a time limit, exactly as rclpy does."""
-        if timeout_sec is not None or self._tasks:
+        if timeout_sec is not None or self._has_tasks():
             super().spin_once(timeout_sec)
             return
+        if time.monotonic() >= self._events_due:
+            self._events_due = time.monotonic() + EVENTS_EVERY_S
+            super().spin_once(0)
         if self._stale:
             self._gather()
         wait_set = self._wait_set
@@ -106,6 +116,14 @@ class LeanExecutor(SingleThreadedExecutor):
         ):
             super().spin_once(0)
 
+    def _has_tasks(self) -> bool:
+        """Whether tasks wait to be run or finished; rclpy keeps finished ones for a while."""
+        if not self._tasks:
+            return False
+        with self._tasks_lock:
+            self._tasks = [item for item in self._tasks if not item[0].done()]
+            return bool(self._tasks)
+
     def _gather(self) -> None:
         self._held.close()
         self._held = held = ExitStack()
@@ -116,7 +134,9 @@ class LeanExecutor(SingleThreadedExecutor):
         guards = _alive(held, [item for node in nodes for item in node.guards])
         services = _alive(held, [item for node in nodes for item in node.services])
         clients = _alive(held, [item for node in nodes for item in node.clients])
-        self._waitables = [item for node in nodes for item in node.waitables]
+        self._waitables = [
+            item for node in nodes for item in node.waitables if not isinstance(item, EventHandler)
+        ]
         own = [self._guard, self._sigint_gc]
         count = [len(subscriptions), len(guards) + len(own), len(timers), len(clients)]
         count += [len(services), 0]

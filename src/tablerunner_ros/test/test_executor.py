@@ -11,11 +11,13 @@ import rclpy
 from rcl_interfaces.srv import GetParameters
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
 from tablerunner_ros.executor import LeanExecutor, make_executor
+from tablerunner_ros.qos import qos_for
 from tablerunner_ros.testing.domain import lease_domain
 
 
@@ -130,6 +132,39 @@ def test_executor_service_and_client_work(bench: Bench) -> None:
     future = client.call_async(GetParameters.Request(names=['use_sim_time']))
     bench.until(future.done)
     assert future.result().values[0].bool_value is False
+
+
+def test_executor_after_rare_work_is_lean_again(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One service call does not leave it on rclpy's slow way for good."""
+    client = bench.other.create_client(GetParameters, 'lean/get_parameters')
+    bench.until(client.service_is_ready)
+    bench.until(client.call_async(GetParameters.Request(names=['use_sim_time'])).done)
+    slow: list[int] = []
+    true_way = SingleThreadedExecutor.spin_once
+
+    def watched(executor: Any, timeout_sec: float | None = None) -> None:
+        slow.append(1)
+        true_way(executor, timeout_sec)
+
+    monkeypatch.setattr(SingleThreadedExecutor, 'spin_once', watched)
+    end = bench.ticks + 50
+    bench.until(lambda: bench.ticks >= end)
+    assert len(slow) < 5
+
+
+def test_executor_events_of_publishers_are_looked_at(bench: Bench) -> None:
+    """A subscriber that asks for more than is offered is reported, within a second or two."""
+    events: list[Any] = []
+    bench.node.create_publisher(
+        Int32,
+        'c',
+        qos_for('imu/data'),
+        event_callbacks=PublisherEventCallbacks(incompatible_qos=events.append),
+    )
+    bench.other.create_subscription(Int32, 'c', lambda message: None, qos_for('odom'))
+    bench.until(lambda: events)
 
 
 def test_executor_entities_that_come_and_go_are_noticed(bench: Bench) -> None:
