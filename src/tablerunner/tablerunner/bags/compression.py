@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from binascii import crc32
 from typing import Any
@@ -24,9 +25,10 @@ def decompress(data: bytes, kind: str, size: int, checksum: int) -> tuple[bytes,
     if kind == '':
         raw, problem = bytes(data), ''
     elif kind == 'lz4':
-        raw, problem = _stream(_lz4(), data)
+        raw, problem = _stream(_lz4(), data, RuntimeError, size)
     elif kind == 'zstd':
-        raw, problem = _stream(_zstd().ZstdDecompressor(), data)
+        zstd = _zstd()
+        raw, problem = _stream(zstd.ZstdDecompressor(), data, zstd.ZstdError, size)
     else:
         return b'', f'a chunk is compressed by {kind!r}, which is not known'
     if len(raw) > size:
@@ -47,26 +49,33 @@ def decompress_message(data: bytes) -> bytes:
 
 def decompress_file(data: bytes) -> tuple[bytes, str]:
     """Return a file that was compressed by zstd, and what is wrong with it (empty: nothing)."""
-    return _stream(_zstd().ZstdDecompressor(), data)
+    zstd = _zstd()
+    return _stream(zstd.ZstdDecompressor(), data, zstd.ZstdError)
 
 
-def _stream(decompressor: Any, data: bytes) -> tuple[bytes, str]:
-    """Feed data in small steps, so that what stands before a damaged place is kept."""
+def _stream(
+    decompressor: Any, data: bytes, damaged: type[Exception], most: float = math.inf
+) -> tuple[bytes, str]:
+    """Feed data in small steps, so that what stands before a damaged place is kept.
+
+    It ends once there is more than `most`: damaged data may claim to be of any size.
+    """
     step = 1 << 12
-    parts = []
-    problem = ''
+    parts: list[bytes] = []
+    total, problem = 0, ''
     try:
         for start in range(0, len(data), step):
-            if decompressor.eof:
+            if decompressor.eof or total > most:
                 break
             parts.append(decompressor.decompress(data[start : start + step]))
-    except Exception as error:  # each library has an error of its own, unrelated to others
+            total += len(parts[-1])
+    except (damaged, ValueError, EOFError) as error:
         problem = f'the compressed data is damaged ({error})'
     return b''.join(parts), problem
 
 
 def _lz4() -> Any:
-    from lz4.frame import LZ4FrameDecompressor
+    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 
     return LZ4FrameDecompressor()
 

@@ -89,8 +89,9 @@ class BagFolder:
             if file in present:
                 self.files.append(file)
             else:
-                self.damage.append(Damage(file.name, '', 'the file is missing', 'all messages '
-                                          'in it are missing'))
+                self.damage.append(
+                    Damage(file.name, '', 'the file is missing', 'all messages in it are missing')
+                )
         for file in present:
             if file not in self.files:
                 self.files.append(file)
@@ -114,6 +115,5 @@ class BagFolder:
 def _natural(file: Path) -> list[tuple[int, str]]:
     """Sort bag_2.mcap before bag_10.mcap."""
     return [
-        (int(part), '') if part.isdigit() else (0, part)
-        for part in re.split(r'(\d+)', file.name)
+        (int(part), '') if part.isdigit() else (0, part) for part in re.split(r'(\d+)', file.name)
     ]

@@ -200,8 +200,8 @@ def scenario_text(data: LabyrinthData) -> str:
     }
     head = (
         '# Robot and anchors of the labyrinth (Tim Pfeifer, TU Chemnitz, CC BY-SA 4.0).\n'
-        '# The recording is flat: tag and anchors are taken to be at one height. The wheel radius\n'
-        '# is nominal, the heading at the start is not known.\n'
+        '# The recording is flat: tag and anchors are taken to be at one height. The radius of\n'
+        '# the wheels is nominal, the heading at the start is not known.\n'
     )
     return head + yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
 

@@ -18,7 +18,7 @@ from tablerunner.bags.storage import Channel, Damage, Entry
 
 MAGIC = b'\x89MCAP0\r\n'
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06
-_METADATA, _DATA_END = 0x0C, 0x0F
+_DATA_END = 0x0F
 _LAST_OPCODE = 0x0F
 _PREFIX = struct.Struct('<BQ')
 _MESSAGE_HEAD = struct.Struct('<HIQQ')
@@ -30,6 +30,7 @@ _U64 = struct.Struct('<Q')
 _CHUNK_START = re.compile(
     rb'\x06(?=.{8}.{8}.{8}.{8}.{4}(?:\x00{4}|\x03\x00\x00\x00lz4|\x04\x00\x00\x00zstd))', re.DOTALL
 )
+_FOOTER_SIZE = 20
 _KEPT_CHUNKS = 4
 
 
@@ -42,7 +43,6 @@ class McapStorage:
         self.channels: dict[int, Channel] = {}
         self.entries: list[Entry] = []
         self.damage: list[Damage] = []
-        self.metadata = ''
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._orphans: dict[int, int] = {}
         self._chunks: dict[int, tuple[int, int, str, int]] = {}  # offset, size, kind, raw size
@@ -86,10 +86,17 @@ class McapStorage:
         ended = False
         while position < size and not ended:
             position, ended = self._top_level(position, size)
+        whole = self._read_footer(size)
         if not ended:
-            self._note(f'byte {size}', 'the file ends without its closing records', 'it was cut '
-                       'off or never closed; what stood behind is missing')
-        self._read_footer(size)
+            self._note(
+                f'byte {size}',
+                'the file ends without its closing records',
+                'it was cut off or never closed; what stood behind is missing',
+            )
+        elif not whole:
+            self._note(
+                f'byte {size}', 'the index at the end is damaged', 'no message is lost by that'
+            )
         self._settle_orphans()
 
     def _top_level(self, position: int, size: int) -> tuple[int, bool]:
@@ -106,7 +113,8 @@ class McapStorage:
         if not 0 < opcode <= _LAST_OPCODE and opcode < 0x80:
             following = self._next_chunk(position + 1)
             self._note(
-                f'byte {position}', 'no MCAP record begins here',
+                f'byte {position}',
+                'no MCAP record begins here',
                 f'{following - position} bytes passed over',
             )
             return following, False
@@ -114,7 +122,8 @@ class McapStorage:
             following = self._next_chunk(position + 1)
             if following < size:
                 self._note(
-                    f'byte {position}', 'a record is longer than the file',
+                    f'byte {position}',
+                    'a record is longer than the file',
                     f'{following - position} bytes passed over',
                 )
             return following, False
@@ -145,11 +154,17 @@ class McapStorage:
         self._chunks[number] = (data, size, kind, raw_size)
         raw, problem = self._open_chunk(number, checksum if whole else 0)
         if problem:
-            self._note(f'byte {position}', problem, 'its messages are missing' if not raw else
-                       'what it still gives was read')
+            self._note(
+                f'byte {position}',
+                problem,
+                'its messages are missing' if not raw else 'what it still gives was read',
+            )
         elif not whole:
-            self._note(f'byte {end}', 'the last chunk is cut off', f'{len(raw)} of {raw_size} '
-                       'bytes of it are left')
+            self._note(
+                f'byte {end}',
+                'the last chunk is cut off',
+                f'{len(raw)} of {raw_size} bytes of it are left',
+            )
         self._chunk_records(number, raw, complete=len(raw) == raw_size, position=position)
         return True
 
@@ -175,8 +190,9 @@ class McapStorage:
             end = body + length
             if opcode not in (_SCHEMA, _CHANNEL, _MESSAGE) and opcode < 0x80:
                 self._note(
-                    f'byte {position}', f'a chunk holds a record of kind {opcode} at its byte '
-                    f'{here}', f'the last {size - here} bytes of the chunk are missing',
+                    f'byte {position}',
+                    f'a chunk holds a record of kind {opcode} at its byte {here}',
+                    f'the last {size - here} bytes of the chunk are missing',
                 )
                 return
             if end > size:
@@ -188,8 +204,9 @@ class McapStorage:
             here = end
         if here < size and complete:
             self._note(
-                f'byte {position}', f'a record of a chunk is longer than the chunk, at its byte '
-                f'{here}', f'the last {size - here} bytes of the chunk are missing',
+                f'byte {position}',
+                f'a record of a chunk is longer than the chunk, at its byte {here}',
+                f'the last {size - here} bytes of the chunk are missing',
             )
 
     def _record(
@@ -218,10 +235,6 @@ class McapStorage:
             name, encoding, text = self._schemas.get(schema, ('', '', ''))
             if key not in self.channels or (name and not self.channels[key].msgtype):
                 self.channels[key] = Channel(topic, name, encoding, text, serialization, qos)
-        elif opcode == _METADATA:
-            name, here = _text(data, body, end)
-            if name == 'rosbag2':
-                self.metadata = _mapping(data, here, end).get('serialized_metadata', '')
 
     # -- past damaged places ----------------------------------------------------------------
 
@@ -240,20 +253,28 @@ class McapStorage:
                 return start
         return size
 
-    def _read_footer(self, size: int) -> None:
-        """Take channels from the summary at the end, for chunks whose own are damaged."""
-        start = size - len(MAGIC) - _PREFIX.size - 20
-        if start < 0 or self._data[start : start + 1] != bytes([_FOOTER]):
-            return
+    def _read_footer(self, size: int) -> bool:
+        """Take channels from the summary at the end, for chunks whose own are damaged.
+
+        Return whether the end is as it should be.
+        """
+        start = size - len(MAGIC) - _PREFIX.size - _FOOTER_SIZE
+        if start < 0 or self._data[size - len(MAGIC) :] != MAGIC:
+            return False
+        if _PREFIX.unpack_from(self._data, start) != (_FOOTER, _FOOTER_SIZE):
+            return False
         (summary,) = _U64.unpack_from(self._data, start + _PREFIX.size)
-        if not 0 < summary < start:
-            return
+        if not summary:
+            return True
+        if summary > start:
+            return False
         for opcode, body, end in _records(self._data, summary, start):
             if opcode in (_SCHEMA, _CHANNEL):
                 try:
                     self._record(opcode, self._data, body, end, -1)
                 except (struct.error, UnicodeDecodeError, IndexError):
-                    return
+                    return False
+        return True
 
     def _settle_orphans(self) -> None:
         """Drop messages whose topic is not known, and say so."""
@@ -261,8 +282,11 @@ class McapStorage:
         lost = sum(entry[3] not in known for entry in self.entries)
         if lost:
             self.entries = [entry for entry in self.entries if entry[3] in known]
-            self._note('', 'the record that names a topic is missing', f'{lost} messages of it '
-                       'cannot be read')
+            self._note(
+                '',
+                'the record that names a topic is missing',
+                f'{lost} messages of it cannot be read',
+            )
 
     # -- helpers ----------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """Records to messages of `rosbags`, for bags that are written without ROS.
 
-The counterpart for rclpy is ``tablerunner_ros.conversions``; the way back is `tablerunner.messages`
-for both.
+The counterpart for rclpy is ``tablerunner_ros.conversions``; the way back, for both, is
+`tablerunner.messages`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def exchange_message(sample: ExchangeSample, frame: str) -> Any:
     """Return an exchange as a message; `frame` is that of the tag's antenna."""
     return make(
         'tablerunner_interfaces/msg/UwbExchange',
-        header=_header(sample.stamp, frame),
+        header=header(sample.stamp, frame),
         anchor_id=sample.anchor_id,
         tag_id=sample.tag_id,
         sequence=sample.sequence,
@@ -71,7 +71,7 @@ def range_message(sample: RangeSample, frame: str) -> Any:
     """Return a range as a message; `frame` is that of the tag's antenna."""
     return make(
         'tablerunner_interfaces/msg/UwbRange',
-        header=_header(sample.stamp, frame),
+        header=header(sample.stamp, frame),
         anchor_id=sample.anchor_id,
         tag_id=sample.tag_id,
         sequence=sample.sequence,
@@ -92,7 +92,7 @@ def anchors_message(anchors: Iterable[Anchor], stamp: int, frame: str) -> Any:
     """Return anchors as a message; `frame` is that of their positions."""
     return make(
         'tablerunner_interfaces/msg/UwbAnchorArray',
-        header=_header(stamp, frame),
+        header=header(stamp, frame),
         anchors=[
             make(
                 'tablerunner_interfaces/msg/UwbAnchor',
@@ -111,7 +111,7 @@ def wheels_message(sample: WheelSample, left_joint: str, right_joint: str, frame
     speeds = np.array([sample.left_speed_rad_s, sample.right_speed_rad_s])
     return make(
         'sensor_msgs/msg/JointState',
-        header=_header(sample.stamp, frame),
+        header=header(sample.stamp, frame),
         name=[left_joint, right_joint],
         position=np.array([sample.left_angle_rad, sample.right_angle_rad]),
         velocity=np.empty(0) if np.isnan(speeds).any() else speeds,
@@ -131,7 +131,7 @@ def imu_message(sample: ImuSample, frame: str) -> Any:
         acceleration[0], forward, lateral = -1.0, 0.0, 0.0
     return make(
         'sensor_msgs/msg/Imu',
-        header=_header(sample.stamp, frame),
+        header=header(sample.stamp, frame),
         orientation=_quaternion(heading),
         orientation_covariance=orientation,
         angular_velocity=_vector(0.0, 0.0, sample.yaw_rate_rad_s),
@@ -145,7 +145,7 @@ def magnetic_message(sample: MagneticSample, frame: str) -> Any:
     """Return a sample as a message of a magnetometer that is mounted along base_link."""
     return make(
         'sensor_msgs/msg/MagneticField',
-        header=_header(sample.stamp, frame),
+        header=header(sample.stamp, frame),
         magnetic_field=_vector(sample.field_x_t, sample.field_y_t, sample.field_z_t),
         magnetic_field_covariance=np.zeros(9),
     )
@@ -155,7 +155,7 @@ def ultrasonic_message(sample: UltrasonicSample) -> Any:
     """Return a reading as a message; its frame is the sensor's name."""
     return make(
         'sensor_msgs/msg/Range',
-        header=_header(sample.stamp, sample.sensor),
+        header=header(sample.stamp, sample.sensor),
         radiation_type=ULTRASOUND,
         field_of_view=sample.field_of_view_rad,
         min_range=sample.min_range_m,
@@ -169,7 +169,7 @@ def odometry_message(sample: OdometrySample, frame: str, child: str) -> Any:
     """Return odometry (or the truth) as a message."""
     return make(
         'nav_msgs/msg/Odometry',
-        header=_header(sample.stamp, frame),
+        header=header(sample.stamp, frame),
         child_frame_id=child,
         pose=_pose_with_covariance(sample.pose, sample.pose_covariance),
         twist=make(
@@ -184,23 +184,21 @@ def pose_message(sample: PoseSample, frame: str) -> Any:
     """Return a pose with covariance as a message."""
     return make(
         'geometry_msgs/msg/PoseWithCovarianceStamped',
-        header=_header(sample.stamp, frame),
+        header=header(sample.stamp, frame),
         pose=_pose_with_covariance(sample.pose, sample.covariance),
     )
 
 
 def goal_message(pose: Pose2, stamp: int, frame: str) -> Any:
     """Return a pose without covariance as a message."""
-    return make(
-        'geometry_msgs/msg/PoseStamped', header=_header(stamp, frame), pose=_pose(pose)
-    )
+    return make('geometry_msgs/msg/PoseStamped', header=header(stamp, frame), pose=_pose(pose))
 
 
 def path_message(poses: Iterable[Pose2], stamp: int, frame: str) -> Any:
     """Return poses as a path."""
     return make(
         'nav_msgs/msg/Path',
-        header=_header(stamp, frame),
+        header=header(stamp, frame),
         poses=[goal_message(pose, stamp, frame) for pose in poses],
     )
 
@@ -218,7 +216,7 @@ def innovation_message(record: Innovation, frame: str, estimator: str) -> Any:
     """Return an innovation as a message; `frame` is that of the estimate."""
     return make(
         'tablerunner_interfaces/msg/Innovation',
-        header=_header(record.stamp, frame),
+        header=header(record.stamp, frame),
         source=record.source,
         key=record.key,
         estimator=estimator,
@@ -238,7 +236,7 @@ def transforms_message(transforms: Iterable[tuple[int, str, str, Pose2]]) -> Any
         transforms=[
             make(
                 'geometry_msgs/msg/TransformStamped',
-                header=_header(stamp, parent),
+                header=header(stamp, parent),
                 child_frame_id=child,
                 transform=make(
                     'geometry_msgs/msg/Transform',
@@ -256,7 +254,8 @@ def _time(stamp: int) -> Any:
     return make('builtin_interfaces/msg/Time', sec=sec, nanosec=nanosec)
 
 
-def _header(stamp: int, frame: str) -> Any:
+def header(stamp: int, frame: str) -> Any:
+    """Return stamp [ns] and frame as a header."""
     return make('std_msgs/msg/Header', stamp=_time(stamp), frame_id=frame)
 
 
@@ -271,7 +270,10 @@ def _point(x: float, y: float, z: float) -> Any:
 def _quaternion(heading: float) -> Any:
     return make(
         'geometry_msgs/msg/Quaternion',
-        x=0.0, y=0.0, z=math.sin(0.5 * heading), w=math.cos(0.5 * heading),
+        x=0.0,
+        y=0.0,
+        z=math.sin(0.5 * heading),
+        w=math.cos(0.5 * heading),
     )
 
 

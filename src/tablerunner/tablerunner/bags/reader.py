@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import tempfile
+from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +23,13 @@ from tablerunner.bags.storage import Channel, Damage, Entry, Storage
 from tablerunner.errors import BagError
 
 _DECODE_ERRORS = (
-    SerdeError, ValueError, KeyError, IndexError, TypeError, OverflowError, struct.error
+    SerdeError,
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    OverflowError,
+    struct.error,
 )
 
 
@@ -98,8 +105,12 @@ class BagReader:
         for (file, topic), (count, stamp, reason) in sorted(self._undecoded.items()):
             noun = 'message' if count == 1 else 'messages'
             found.append(
-                Damage(file, topic, f'{count} {noun} cannot be decoded, the first at {stamp} ns: '
-                       f'{reason}', 'left out')
+                Damage(
+                    file,
+                    topic,
+                    f'{count} {noun} cannot be decoded, the first at {stamp} ns: {reason}',
+                    'left out',
+                )
             )
         return tuple(found)
 
@@ -260,10 +271,7 @@ class BagReader:
         return None
 
     def _summarize(self) -> tuple[TopicInfo, ...]:
-        counts: dict[tuple[int, int], int] = {}
-        for entry in self._entries:
-            key = (entry[1], entry[3])
-            counts[key] = counts.get(key, 0) + 1
+        counts = Counter((entry[1], entry[3]) for entry in self._entries)
         found: dict[str, TopicInfo] = {}
         for number, storage in enumerate(self._storages):
             for key, channel in storage.channels.items():
@@ -271,7 +279,7 @@ class BagReader:
                 found[channel.topic] = TopicInfo(
                     channel.topic,
                     channel.msgtype,
-                    counts.get((number, key), 0) + (before.count if before else 0),
+                    counts[number, key] + (before.count if before else 0),
                     channel.qos or (before.qos if before else ''),
                     self._folder.counts.get(channel.topic),
                 )
@@ -281,8 +289,9 @@ class BagReader:
         """Return where metadata.yaml promises more than was found."""
         found = {item.name: item.count for item in self.topics}
         return [
-            Damage(METADATA, topic, f'{expected} messages are named, {found.get(topic, 0)} were '
-                   'found')
+            Damage(
+                METADATA, topic, f'{expected} messages are named, {found.get(topic, 0)} were found'
+            )
             for topic, expected in sorted(self._folder.counts.items())
             if found.get(topic, 0) != expected
         ]

@@ -7,11 +7,23 @@ import sqlite3
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeAlias
 
 from tablerunner.bags.storage import Channel, Damage, Entry
 from tablerunner.errors import BagError
 
+_TOPICS = 'SELECT id, name, type, serialization_format, offered_qos_profiles FROM topics'
+_TOPICS_WITHOUT_QOS = "SELECT id, name, type, serialization_format, '' FROM topics"
+_ROWS = (
+    'SELECT id, topic_id, timestamp, typeof(data) FROM messages '
+    'WHERE id > ? AND id <= ? ORDER BY id LIMIT ?'
+)
+_DISORDER = 'rows are out of order'
+_HEAD, _LEAST_PAGE = 100, 512  # bytes
 _SUFFIXES = ('-journal', '-wal')
+
+Row: TypeAlias = tuple[int, int, int, str]
+"""Number, topic, time of reception and kind of data of one row."""
 
 
 class SqliteStorage:
@@ -23,7 +35,6 @@ class SqliteStorage:
         self.channels: dict[int, Channel] = {}
         self.entries: list[Entry] = []
         self.damage: list[Damage] = []
-        self.metadata = ''
         self._copy: tempfile.TemporaryDirectory[str] | None = None
         self._connection: sqlite3.Connection | None = None
         if path.stat().st_size == 0:
@@ -33,11 +44,13 @@ class SqliteStorage:
             self._connection = self._open()
             self._topics()
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            self._note('', f'the table of topics cannot be read ({error})', 'nothing of this '
-                       'file can be read')
+            self._note(
+                '',
+                f'the table of topics cannot be read ({error})',
+                'nothing of this file can be read',
+            )
             return
         self._rows()
-        self._inner_metadata()
 
     def close(self) -> None:
         """Let go of the file."""
@@ -50,143 +63,168 @@ class SqliteStorage:
 
     def load(self, entry: Entry) -> bytes:
         """Return the serialised message of a row; BagError when one of its pages is damaged."""
-        assert self._connection is not None
         try:
             query = 'SELECT data FROM messages WHERE id = ?'
-            return bytes(self._connection.execute(query, (entry[4],)).fetchone()[0])
+            return bytes(self._query(query, (entry[4],)).fetchone()[0])
         except (sqlite3.Error, TypeError) as error:
             raise BagError(f'row {entry[4]} cannot be read ({error})') from error
+
+    def _query(self, text: str, values: tuple[int, ...] = ()) -> sqlite3.Cursor:
+        if self._connection is None:
+            raise BagError(f'{self.path} is closed')
+        return self._connection.execute(text, values)
 
     # -- opening ----------------------------------------------------------------------------
 
     def _open(self) -> sqlite3.Connection:
+        size = self.path.stat().st_size
+        with self.path.open('rb') as head:
+            begin = head.read(_HEAD)
+        # As the format says, 1 stands for 65536.
+        page = {1: 65536}.get(value := int.from_bytes(begin[16:18], 'big'), value)
+        stated = int.from_bytes(begin[28:32], 'big')
         journals = [self.path.with_name(self.path.name + end) for end in _SUFFIXES]
         journals = [file for file in journals if file.exists() and file.stat().st_size]
         if journals:
             # A recorder died while writing. SQLite repairs that, but only in a file that it may
             # write to; the bag itself stays as it is.
-            self._copy = tempfile.TemporaryDirectory(prefix='tablerunner-bag-')
-            for file in (self.path, *journals):
-                shutil.copyfile(file, Path(self._copy.name) / file.name)
             self._note('', 'the recorder did not close it', 'read as of its last whole commit')
-            connection = sqlite3.connect(Path(self._copy.name) / self.path.name)
+            connection = sqlite3.connect(self._working_copy(journals, size))
+        elif page >= _LEAST_PAGE and size % page:
+            # SQLite would fill the page that is cut with zeros, and messages on it as well.
+            connection = sqlite3.connect(self._working_copy([], size - size % page))
         else:
             address = f'{self.path.resolve().as_uri()}?mode=ro&immutable=1'
             connection = sqlite3.connect(address, uri=True)
+        if not journals and page >= _LEAST_PAGE and size < stated * page:
+            lost = f'{stated - size // page} of {stated} pages are missing'
+            self._note(f'byte {size}', 'the file is cut off', lost)
         # Otherwise SQLite refuses a file that is shorter than its head says, as a whole.
         connection.execute('PRAGMA writable_schema = ON')
         connection.execute('PRAGMA query_only = ON')
-        pages = connection.execute('PRAGMA page_size').fetchone()[0]
-        with self.path.open('rb') as file:
-            stated = int.from_bytes(file.read(32)[28:], 'big')
-        present = self.path.stat().st_size // pages
-        if not journals and present < stated:
-            self._note(f'byte {self.path.stat().st_size}', 'the file is cut off',
-                       f'{stated - present} of {stated} pages are missing')
         return connection
 
+    def _working_copy(self, journals: list[Path], size: int) -> Path:
+        """Return a copy of the first bytes of the file, with journals beside it."""
+        self._copy = tempfile.TemporaryDirectory(prefix='tablerunner-bag-')
+        folder = Path(self._copy.name)
+        for file in (self.path, *journals):
+            shutil.copyfile(file, folder / file.name)
+        with (folder / self.path.name).open('r+b') as stream:
+            stream.truncate(size)
+        return folder / self.path.name
+
     def _topics(self) -> None:
-        assert self._connection is not None
-        columns = {row[1] for row in self._connection.execute('PRAGMA table_info(topics)')}
+        columns = {row[1] for row in self._query('PRAGMA table_info(topics)')}
         if not columns:
             raise sqlite3.DatabaseError('there is none')
-        qos = 'offered_qos_profiles' if 'offered_qos_profiles' in columns else "''"
+        query = _TOPICS if 'offered_qos_profiles' in columns else _TOPICS_WITHOUT_QOS
         definitions = self._definitions()
-        for key, name, msgtype, serialization, profiles in self._connection.execute(
-            f'SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id'
-        ):
+        for key, name, msgtype, serialization, profiles in self._query(query):
+            if not all(isinstance(word, str) for word in (name, msgtype, serialization, profiles)):
+                self._note(f'topic {key}', 'its row is damaged', 'its messages are left out')
+                continue
             encoding, text = definitions.get(msgtype, ('', ''))
             self.channels[key] = Channel(name, msgtype, encoding, text, serialization, profiles)
 
     def _definitions(self) -> dict[str, tuple[str, str]]:
-        assert self._connection is not None
         try:
-            if not self._connection.execute('PRAGMA table_info(message_definitions)').fetchall():
+            if not self._query('PRAGMA table_info(message_definitions)').fetchall():
                 return {}
-            rows = self._connection.execute(
+            rows = self._query(
                 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
             )
             return {row[0]: (row[1], row[2]) for row in rows}
         except sqlite3.Error as error:
-            self._note('message definitions', str(error), 'definitions known to this program '
-                       'are used')
+            self._note(
+                'message definitions', str(error), 'definitions known to this program are used'
+            )
             return {}
-
-    def _inner_metadata(self) -> None:
-        assert self._connection is not None
-        try:
-            row = self._connection.execute('SELECT metadata FROM metadata LIMIT 1').fetchone()
-        except (sqlite3.Error, UnicodeDecodeError):
-            return  # older versions have none, and metadata.yaml says the same
-        self.metadata = row[0] if row and isinstance(row[0], str) else ''
 
     # -- rows -------------------------------------------------------------------------------
 
     def _rows(self) -> None:
-        strangers = 0
+        strangers = empty = 0
         for key, topic, stamp, kind in self._walk():
             if kind != 'blob' or not isinstance(topic, int) or not isinstance(stamp, int):
-                self._note(f'message {key}', 'a row holds no message', 'left out')
+                empty += 1
             elif topic not in self.channels:
                 strangers += 1
             else:
-                self.entries.append(
-                    (stamp, self._number, len(self.entries), topic, key, 0, 0)
-                )
+                self.entries.append((stamp, self._number, len(self.entries), topic, key, 0, 0))
+        if empty:
+            self._note('', f'{empty} rows hold no message', 'left out')
         if strangers:
             self._note('', f'{strangers} messages belong to no topic', 'left out')
 
-    def _walk(self) -> Iterator[tuple[int, int, int, str]]:
-        """Yield rows in their order; pass over what cannot be read and note it."""
-        last = -1
-        while True:
+    def _walk(self) -> Iterator[Row]:
+        """Yield rows in the order of their numbers; pass over what cannot be read and note it.
+
+        A damaged page may hold any number: each row must have a greater one than that before it,
+        or this would never end.
+        """
+        last, end = 0, self._greatest()
+        while last < end:
+            reason = _DISORDER
             try:
-                for row in self._after(last):
+                for row in self._rows_after(last, end):
+                    if not last < row[0] <= end:
+                        break
                     yield row
                     last = row[0]
-                return
             except sqlite3.Error as error:
-                following = self._readable_after(last + 1)
-                first = last + 1
-                if following is None:
-                    self._note(f'messages from {first} on', str(error), 'missing')
-                    return
-                self._note(f'messages {first} to {following - 1}', str(error), 'missing')
-                last = following - 1
+                reason = str(error)
+            if last < end:
+                following = self._readable_from(last + 1, end)
+                through = end if following is None else following[0] - 1
+                if through > last:
+                    self._note(f'messages {last + 1} to {through}', reason, 'missing')
+                last = through
+                if following is not None:
+                    # Python steps one row ahead: this one was lost to what comes behind it.
+                    yield following
+                    last = following[0]
 
-    def _after(self, last: int, limit: int = -1) -> Iterator[tuple[int, int, int, str]]:
-        assert self._connection is not None
-        yield from self._connection.execute(
-            'SELECT id, topic_id, timestamp, typeof(data) FROM messages '
-            'WHERE id > ? ORDER BY id LIMIT ?',
-            (last, limit),
-        )
+    def _greatest(self) -> int:
+        """Return the greatest row number, or one that it cannot exceed."""
+        most = self.path.stat().st_size  # a row takes several bytes
+        try:
+            found = self._query('SELECT max(id) FROM messages').fetchone()[0]
+        except sqlite3.Error:
+            return most
+        if found is None:
+            return 0
+        return min(found, most) if isinstance(found, int) else most
 
-    def _readable_after(self, first: int) -> int | None:
-        """Return the first row number at or after one from which reading works again."""
-        step, working = 1, None
-        while step < 1 << 40:
-            row = self._try_from(first + step)
-            if row is not None:
-                working = row
-                break
-            step *= 2
-        if working is None:
-            return None
-        low, high = first + step // 2, first + step
+    def _rows_after(self, last: int, end: int, limit: int = -1) -> Iterator[Row]:
+        yield from self._query(_ROWS, (last, end, limit))
+
+    def _readable_from(self, first: int, end: int) -> Row | None:
+        """Return the first row that can be read at or after `first`.
+
+        Found by ever larger steps and then by halving: a row that can be read between two that
+        cannot may be passed over.
+        """
+        step = 1
+        while self._row_from(first + step - 1, end) is None:
+            if first + step - 1 >= end:
+                return None
+            step = min(2 * step, end - first + 1)
+        low, high = first + step // 2 - 1, first + step - 1
         while high - low > 1:
             middle = (low + high) // 2
-            if self._try_from(middle) is None:
+            if self._row_from(middle, end) is None:
                 low = middle
             else:
                 high = middle
-        return self._try_from(high)
+        return self._row_from(high, end)
 
-    def _try_from(self, first: int) -> int | None:
+    def _row_from(self, first: int, end: int) -> Row | None:
         try:
-            return next((row[0] for row in self._after(first - 1, 1)), None)
+            row = next(self._rows_after(first - 1, end, 1), None)
         except sqlite3.Error:
             return None
+        return row if row is not None and first <= row[0] <= end else None
 
     def _note(self, place: str, reason: str, lost: str = '') -> None:
         self.damage.append(Damage(self.path.name, place, reason, lost))

@@ -59,7 +59,6 @@ class Storage(Protocol):
     channels: dict[int, Channel]
     entries: list[Entry]
     damage: list[Damage]
-    metadata: str  # text of the metadata.yaml that the file carries inside; may be empty
 
     def load(self, entry: Entry) -> bytes:
         """Return the serialised message of an entry; BagError when it cannot be read."""

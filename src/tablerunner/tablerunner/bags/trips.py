@@ -31,7 +31,12 @@ SHORTEST_HALT_S = 0.4
 
 _JOINED_S = 1.0
 _TOPICS = (
-    'odometry/filtered', 'ground_truth', 'uwb/pose', 'uwb/ranges', 'uwb/anchors', 'innovations'
+    'odometry/filtered',
+    'ground_truth',
+    'uwb/pose',
+    'uwb/ranges',
+    'uwb/anchors',
+    'innovations',
 )
 
 
@@ -93,7 +98,6 @@ def trip_of_bag(bag: BagReader, title: str, namespace: str = '') -> Trip | None:
         tuple(innovations),
     )
     return replace(trip, halts=_halts(bag, trip, namespace))
-
 
 
 def _row(item: OdometrySample) -> tuple[float, float, float]:

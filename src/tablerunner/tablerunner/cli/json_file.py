@@ -22,7 +22,9 @@ def write_json(file: Path, content: Any) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(_strict(content), indent=2) + '\n', encoding='utf-8')
     except OSError as error:
-        raise ConfigError('', str(file), f'a file that can be written ({error.strerror})') from error
+        raise ConfigError(
+            '', str(file), f'a file that can be written ({error.strerror})'
+        ) from error
 
 
 def _strict(value: Any) -> Any:

@@ -55,9 +55,7 @@ def replay(
     from tablerunner.cli.replay_options import find_scenario, replay_config
 
     room = find_scenario(bag, scenario)
-    config = changed(
-        replay_config(room, estimator, start, namespace), fixes=plot_file is not None
-    )
+    config = changed(replay_config(room, estimator, start, namespace), fixes=plot_file is not None)
     with Progress() as progress:
         progress.show(f'replaying {bag}')
         begun = time.perf_counter()

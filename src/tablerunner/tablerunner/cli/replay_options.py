@@ -42,9 +42,7 @@ def replay_config(
     """
     config = ReplayConfig() if scenario is None else ReplayConfig.from_scenario(scenario)
     try:
-        localizer = replace(
-            config.localizer, estimator=estimator, initial_pose=parse_start(start)
-        )
+        localizer = replace(config.localizer, estimator=estimator, initial_pose=parse_start(start))
     except ConfigError as error:
         raise error.located('options') from None
     return replace(config, localizer=localizer, namespace=namespace)

@@ -78,9 +78,7 @@ class Trip:
     stamps: Stamps
     poses: Matrix
     covariances: Matrix
-    truth: Truth = field(
-        default_factory=lambda: Truth(_no_stamps(), _no_positions(), np.empty(0))
-    )
+    truth: Truth = field(default_factory=lambda: Truth(_no_stamps(), _no_positions(), np.empty(0)))
     fixes: Matrix = field(default_factory=_no_positions)
     fix_stamps: Stamps = field(default_factory=_no_stamps)
     ranges: tuple[RangeSample, ...] = ()
@@ -146,8 +144,12 @@ def errors_table(trip: Trip) -> dict[str, Any]:
         'ranges': len(trip.ranges),
         'nlos_ranges': len(trip.nlos()),
         'halts': [
-            {'after': seconds(item.stamp - trip.start), 'duration': item.duration_s,
-             'x': item.x, 'y': item.y}
+            {
+                'after': seconds(item.stamp - trip.start),
+                'duration': item.duration_s,
+                'x': item.x,
+                'y': item.y,
+            }
             for item in trip.halts
         ],
     }

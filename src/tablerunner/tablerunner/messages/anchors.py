@@ -13,9 +13,7 @@ from tablerunner.types import Anchor, Refusal
 SOURCE = 'uwb/anchors'
 
 
-def anchors_from_message(
-    message: Any, frame: str = ''
-) -> tuple[Anchor, ...] | Refusal:
+def anchors_from_message(message: Any, frame: str = '') -> tuple[Anchor, ...] | Refusal:
     """Return the anchors of a message; `frame` is the one expected, empty for any.
 
     The position variance kept is the largest of the three axes.

@@ -51,9 +51,7 @@ def imu_from_message(message: Any, mount_heading: float = 0.0) -> ImuSample | Re
     return ImuSample(stamp, rate, forward, lateral, heading, variance)
 
 
-def magnetic_from_message(
-    message: Any, mount_heading: float = 0.0
-) -> MagneticSample | Refusal:
+def magnetic_from_message(message: Any, mount_heading: float = 0.0) -> MagneticSample | Refusal:
     """Return the field in base_link axes; `mount_heading` as for `imu_from_message`."""
     stamp = stamp_from_message(message.header.stamp)
     field = message.magnetic_field

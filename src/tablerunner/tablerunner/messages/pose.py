@@ -24,9 +24,7 @@ def pose2_from_message(message: Any) -> Pose2 | str:
     return quaternion_fault(message.orientation) or 'position is not finite'
 
 
-def pose_from_message(
-    message: Any, frame: str, source: str
-) -> PoseSample | Refusal:
+def pose_from_message(message: Any, frame: str, source: str) -> PoseSample | Refusal:
     """Return a pose with covariance; a heading of which nothing is known has variance inf.
 
     Parameters
@@ -53,9 +51,7 @@ def pose_from_message(
     return PoseSample(stamp, pose, covariance, source)
 
 
-def goal_from_message(
-    message: Any, frame: str, source: str = 'goal_pose'
-) -> Pose2 | Refusal:
+def goal_from_message(message: Any, frame: str, source: str = 'goal_pose') -> Pose2 | Refusal:
     """Return a goal; `frame` is the one expected, empty for any."""
     stamp = stamp_from_message(message.header.stamp)
     if frame and message.header.frame_id != frame:

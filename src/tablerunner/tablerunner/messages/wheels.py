@@ -14,9 +14,7 @@ RIGHT_JOINT = 'right_wheel_joint'
 """Names of the drive wheels' joints unless a parameter says otherwise."""
 
 
-def wheels_from_message(
-    message: Any, left_joint: str, right_joint: str
-) -> WheelSample | Refusal:
+def wheels_from_message(message: Any, left_joint: str, right_joint: str) -> WheelSample | Refusal:
     """Return angles and speeds of both drive wheels, found by the names of their joints."""
     stamp = stamp_from_message(message.header.stamp)
     names = message.name
@@ -35,6 +33,4 @@ def wheels_from_message(
         if len(speeds):
             return Refusal(stamp, SOURCE, '', 'names and velocities differ in number')
         return WheelSample(stamp, left_angle, right_angle)
-    return WheelSample(
-        stamp, left_angle, right_angle, float(speeds[left]), float(speeds[right])
-    )
+    return WheelSample(stamp, left_angle, right_angle, float(speeds[left]), float(speeds[right]))

@@ -30,9 +30,7 @@ from tablerunner.types import (
 ROOT = Path(__file__).parents[4]
 RESTAURANT = ROOT / 'src' / 'tablerunner_bringup' / 'scenarios' / 'restaurant.yaml'
 ROUTE = ((7.2, 11.0), (5.2, 10.4), (5.2, 5.5), (5.2, 4.0), (9.8, 4.0), (9.8, 10.4), (7.2, 10.8))
-TOPICS = (
-    'joint_states', 'imu/data', 'imu/mag', 'uwb/exchanges', 'uwb/anchors', 'ground_truth'
-)
+TOPICS = ('joint_states', 'imu/data', 'imu/mag', 'uwb/exchanges', 'uwb/anchors', 'ground_truth')
 
 
 @pytest.fixture(scope='session')
@@ -49,7 +47,9 @@ def labyrinth_folder() -> Path:
     given = os.environ.get('TABLERUNNER_DATA')
     folder = (Path(given) if given else ROOT.parent / 'shared' / 'data') / 'labyrinth_tuc'
     if not folder.is_dir():
-        pytest.skip(f'the labyrinth recording is not at {folder} (TABLERUNNER_DATA names its parent)')
+        pytest.skip(
+            f'the labyrinth recording is not at {folder} (TABLERUNNER_DATA names its parent)'
+        )
     return folder
 
 
@@ -62,13 +62,18 @@ def steer(truth: Truth, goal: tuple[float, float]) -> Velocity:
 
 
 def simulate(
-    scenario: Scenario, seed: int, duration_s: float, route: tuple[tuple[float, float], ...] = ROUTE
+    scenario: Scenario,
+    seed: int,
+    duration_s: float,
+    route: tuple[tuple[float, float], ...] = ROUTE,
 ) -> Iterator[tuple[str, int, object]]:
     """Yield (topic, stamp, message) of a drive along a route that ends where it began."""
     simulator = Simulator(scenario, seed)
     anchors = tuple(place.anchor for place in scenario.anchors)
-    yield 'uwb/anchors', simulator.now_ns, messages.anchors_message(
-        anchors, simulator.now_ns, 'map'
+    yield (
+        'uwb/anchors',
+        simulator.now_ns,
+        messages.anchors_message(anchors, simulator.now_ns, 'map'),
     )
     target = 0
     for _ in range(round(duration_s * 100)):
@@ -94,9 +99,7 @@ def _convert(sample: object) -> tuple[str, object] | None:
     if isinstance(sample, UltrasonicSample):
         return None
     if isinstance(sample, Truth):
-        record = OdometrySample(
-            sample.stamp, sample.pose, sample.linear_m_s, sample.angular_rad_s
-        )
+        record = OdometrySample(sample.stamp, sample.pose, sample.linear_m_s, sample.angular_rad_s)
         return 'ground_truth', messages.odometry_message(record, 'map', 'base_link')
     return None
 
@@ -105,8 +108,9 @@ def _convert(sample: object) -> tuple[str, object] | None:
 def make_bag() -> Callable[..., Path]:
     """Return a function that writes a simulated drive into a bag."""
 
-    def make(folder: Path, scenario: Scenario, seed: int, duration_s: float,
-             storage: str = 'mcap') -> Path:
+    def make(
+        folder: Path, scenario: Scenario, seed: int, duration_s: float, storage: str = 'mcap'
+    ) -> Path:
         with BagWriter(folder, storage) as bag:
             for topic in TOPICS:
                 bag.add_topic(topic, CONTRACT[topic].msgtype, CONTRACT[topic].quality)

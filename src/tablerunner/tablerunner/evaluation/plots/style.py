@@ -21,7 +21,7 @@ TEXT = '#222222'
 SUBDUED = '#6B6B6B'
 GRID = '#E6E6E6'
 
-RC: dict[str, Any] = {
+RC: Any = {
     'font.family': 'DejaVu Sans',
     'font.size': 9.0,
     'text.color': TEXT,

@@ -129,13 +129,25 @@ def _draw_plan(axes: Any, trip: Trip) -> None:
     _draw_rays(axes, trip)
     if len(trip.fixes):
         axes.plot(
-            *trip.fixes.T, ls='', marker='o', ms=2.4, mfc=style.FIX, mec='none', alpha=0.55,
-            zorder=3.5, label='UWB-only fix',
+            *trip.fixes.T,
+            ls='',
+            marker='o',
+            ms=2.4,
+            mfc=style.FIX,
+            mec='none',
+            alpha=0.55,
+            zorder=3.5,
+            label='UWB-only fix',
         )
     if len(trip.truth):
         axes.plot(
-            *trip.truth.positions.T, color=style.TRUTH, lw=3.2, alpha=0.28, zorder=4,
-            solid_capstyle='round', label='truth',
+            *trip.truth.positions.T,
+            color=style.TRUTH,
+            lw=3.2,
+            alpha=0.28,
+            zorder=4,
+            solid_capstyle='round',
+            label='truth',
         )
     if len(trip.stamps):
         path = _with_gaps(trip.stamps, trip.poses[:, :2])
@@ -158,8 +170,15 @@ def _draw_plan(axes: Any, trip: Trip) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         axes.legend(
-            handles, labels, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=len(handles),
-            handlelength=1.7, columnspacing=1.5, borderpad=0.0, borderaxespad=0.6,
+            handles,
+            labels,
+            loc='lower left',
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=len(handles),
+            handlelength=1.7,
+            columnspacing=1.5,
+            borderpad=0.0,
+            borderaxespad=0.6,
         )
 
 
@@ -192,13 +211,28 @@ def _draw_ellipses(axes: Any, trip: Trip) -> None:
     turn = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
     axes.add_collection(
         EllipseCollection(
-            axes_m[:, 1], axes_m[:, 0], turn, units='xy', offsets=trip.poses[rows, :2],
-            offset_transform=axes.transData, facecolors=style.ESTIMATE, edgecolors=style.ESTIMATE,
-            linewidths=0.7, alpha=0.18, zorder=4.5,
+            axes_m[:, 1],
+            axes_m[:, 0],
+            turn,
+            units='xy',
+            offsets=trip.poses[rows, :2],
+            offset_transform=axes.transData,
+            facecolors=style.ESTIMATE,
+            edgecolors=style.ESTIMATE,
+            linewidths=0.7,
+            alpha=0.18,
+            zorder=4.5,
         )
     )
     axes.plot(
-        [], [], ls='', marker='o', ms=8, mfc=style.ESTIMATE, mec=style.ESTIMATE, alpha=0.3,
+        [],
+        [],
+        ls='',
+        marker='o',
+        ms=8,
+        mfc=style.ESTIMATE,
+        mec=style.ESTIMATE,
+        alpha=0.3,
         label=f'{ELLIPSE_SIGMAS:.0f}-sigma ellipse',
     )
 
@@ -208,7 +242,14 @@ def _draw_ends(axes: Any, trip: Trip) -> None:
     for row, face in ((0, 'white'), (-1, style.ESTIMATE)):
         x, y, heading = trip.poses[row]
         axes.plot(
-            x, y, marker='o', ms=8, mfc=face, mec=style.ESTIMATE, mew=1.6, zorder=6.5,
+            x,
+            y,
+            marker='o',
+            ms=8,
+            mfc=face,
+            mec=style.ESTIMATE,
+            mew=1.6,
+            zorder=6.5,
         )
         axes.annotate(
             '',
@@ -221,8 +262,14 @@ def _draw_ends(axes: Any, trip: Trip) -> None:
 
 def _draw_errors(axes: Any, trip: Trip, series: ErrorSeries) -> None:
     if not len(series.stamps):
-        axes.text(0.5, 0.5, 'no truth to compare with', ha='center', color=style.SUBDUED,
-                  transform=axes.transAxes)
+        axes.text(
+            0.5,
+            0.5,
+            'no truth to compare with',
+            ha='center',
+            color=style.SUBDUED,
+            transform=axes.transAxes,
+        )
         return
     times = _since(trip, series.stamps)
     largest = np.linalg.eigvalsh(series.covariances[:, :2, :2])[:, 1]
@@ -231,8 +278,14 @@ def _draw_errors(axes: Any, trip: Trip, series: ErrorSeries) -> None:
         begin = seconds(halt.stamp - trip.start)
         axes.axvspan(begin, begin + halt.duration_s, color=style.HALT, alpha=0.22, lw=0)
     table = _with_gaps(series.stamps, np.column_stack([times, series.distances, bound]))
-    axes.fill_between(table[:, 0], table[:, 2], color=style.ESTIMATE, alpha=0.13, lw=0,
-                      label=f'{BAND_SIGMAS:.0f} sigma of the estimate')
+    axes.fill_between(
+        table[:, 0],
+        table[:, 2],
+        color=style.ESTIMATE,
+        alpha=0.13,
+        lw=0,
+        label=f'{BAND_SIGMAS:.0f} sigma of the estimate',
+    )
     axes.plot(table[:, 0], table[:, 1], color=style.ESTIMATE, lw=1.0, label='error')
     top = max(float(np.nanquantile(bound, 0.98)), float(series.distances.max()))
     axes.set_ylim(0.0, 1.15 * top if top > 0.0 else 1.0)
@@ -243,15 +296,23 @@ def _draw_sight(axes: Any, trip: Trip) -> None:
     """Draw one line of ticks for each anchor: when it was without line of sight."""
     names = [anchor.anchor_id for anchor in trip.anchors]
     times: list[Vector] = [
-        np.array([seconds(item.stamp - trip.start) for item in trip.nlos()
-                  if item.anchor_id == name])
+        np.array(
+            [seconds(item.stamp - trip.start) for item in trip.nlos() if item.anchor_id == name]
+        )
         for name in names
     ]
     if names:
         axes.eventplot(times, colors=style.NLOS, linewidths=0.8, linelengths=0.75)
     if all(item.los is LosState.UNKNOWN for item in trip.ranges):
-        axes.text(0.5, 0.5, 'line of sight was not judged', ha='center', va='center',
-                  color=style.SUBDUED, transform=axes.transAxes)
+        axes.text(
+            0.5,
+            0.5,
+            'line of sight was not judged',
+            ha='center',
+            va='center',
+            color=style.SUBDUED,
+            transform=axes.transAxes,
+        )
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.spines['left'].set_visible(False)
