@@ -5,8 +5,7 @@ uses as well.
 """
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction
-from launch.events import Shutdown
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
@@ -36,7 +35,7 @@ def _nodes(context):
             remappings=list(node.remap),
             output='screen',
             # Without one of its nodes the robot has no business driving.
-            on_exit=EmitEvent(event=Shutdown(reason=f'{node.name} ended')),
+            on_exit=Shutdown(reason=f'{node.name} ended'),
         )
         for node in describe(values)
     ]

@@ -38,8 +38,7 @@ def description(monkeypatch: pytest.MonkeyPatch) -> Made:
     """Return what the launch file describes."""
     parts = {
         'launch': ('LaunchDescription',),
-        'launch.actions': ('DeclareLaunchArgument', 'EmitEvent', 'OpaqueFunction'),
-        'launch.events': ('Shutdown',),
+        'launch.actions': ('DeclareLaunchArgument', 'OpaqueFunction', 'Shutdown'),
         'launch.substitutions': ('LaunchConfiguration',),
         'launch_ros': (),
         'launch_ros.actions': ('Node',),
