@@ -14,7 +14,7 @@ from tablerunner_ros.clocks import now_ns
 from tablerunner_ros.conversions.anchors import anchors_to_message
 from tablerunner_ros.conversions.exchange import exchange_from_message
 from tablerunner_ros.conversions.pose import pose_to_message
-from tablerunner_ros.conversions.uwb_range import range_to_message
+from tablerunner_ros.conversions.uwb_range import fill_range
 from tablerunner_ros.diagnostics import WARN, Diagnostics, Report
 from tablerunner_ros.parameters import declare_config
 from tablerunner_ros.qos import qos_for
@@ -35,7 +35,7 @@ class UwbDriver(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('uwb_driver', **options)
         config = declare_config(self, UwbDriverConfig)
-        self._map_frame, self._tag_frame = config.map_frame, config.tag_frame
+        self._map_frame = config.map_frame
         self._stamps = StampCheck(self, declare_config(self, StampConfig))
         ranger = declare_config(self, RangerConfig, on_change=self._configure_ranger)
         positioner = declare_config(self, PositionerConfig, on_change=self._configure_positioner)
@@ -43,6 +43,8 @@ class UwbDriver(Node):
         self._positioner = Positioner(positioner, ranger.anchors)
         self._last: dict[str, RangeSample] = {}
 
+        self._range = UwbRange()
+        self._range.header.frame_id = config.tag_frame
         self._ranges = self.create_publisher(UwbRange, 'uwb/ranges', qos_for('uwb/ranges'))
         self._fixes = self.create_publisher(
             PoseWithCovarianceStamped, 'uwb/pose', qos_for('uwb/pose')
@@ -69,7 +71,8 @@ class UwbDriver(Node):
         if isinstance(result, Refusal):
             self._diagnostics.refuse(result)
             return
-        self._ranges.publish(range_to_message(result, self._tag_frame))
+        fill_range(self._range, result)
+        self._ranges.publish(self._range)
         self._diagnostics.take(EXCHANGES, result.stamp)
         self._diagnostics.take(f'{EXCHANGES}/{result.anchor_id}', result.stamp)
         self._last[result.anchor_id] = result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 from rclpy.node import Node
@@ -38,5 +39,6 @@ class StampCheck:
         Under use_sim_time the clock reads zero until the first /clock, which may well arrive
         after the first measurement.
         """
-        now = self._clock.now().nanoseconds
+        # A clock of rclpy makes two objects for each reading; wall time is to be had for less.
+        now = self._clock.now().nanoseconds if self._clock.ros_time_is_active else time.time_ns()
         return 0 < now < stamp - self._tolerance
