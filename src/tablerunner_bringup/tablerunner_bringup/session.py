@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -61,7 +61,6 @@ class SessionSettings:
     domain: int | None = None
     parameter_files: tuple[Path, ...] = ()
     up_limit_s: float = _UP_LIMIT_S
-    environment: dict[str, str] = field(default_factory=dict)
 
 
 class Session:
@@ -114,6 +113,9 @@ class Session:
         programs = {
             spec.name: find_executable(spec.package, spec.executable) for spec in self._specs
         }
+        if self._options.simulated:
+            # For this process too: its own nodes must hear no more and no less than the others.
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         self._domain = self._choose_domain()
         self._progress.say(f'run in {self.folder.path}, ROS domain {self._domain_words}')
         self.monitor = Monitor(self.node('tablerunner_launcher'))
@@ -154,13 +156,11 @@ class Session:
         environment = {**os.environ, 'PYTHONUNBUFFERED': '1', 'RCUTILS_COLORIZED_OUTPUT': '0'}
         if self._domain is not None:
             environment['ROS_DOMAIN_ID'] = str(self._domain)
-        if self._options.simulated:
-            environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         environment['ROS_LOG_DIR'] = str((self.folder.logs / 'ros').resolve())
         # The matrices are small: threads of a linear algebra library only get in each other's way.
         environment.setdefault('OPENBLAS_NUM_THREADS', '1')
         environment.setdefault('OMP_NUM_THREADS', '1')
-        return {**environment, **self._settings.environment}
+        return environment
 
     def _command(self, spec: NodeSpec, program: Path) -> Command:
         file = self.folder.parameters / f'{spec.name}.yaml'
