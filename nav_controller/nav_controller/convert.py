@@ -10,10 +10,12 @@ from nav_msgs.msg import Path as PathMessage
 from tablerunner.control import (
     Destination,
     Localisation,
+    MissionState,
     MissionStatus,
     Path,
     SafetyDecision,
     SafetyState,
+    Situation,
     table_stop,
 )
 from tablerunner.errors import ConfigError, MissionError
@@ -63,16 +65,33 @@ def names_of_goal(goal: Deliver.Goal) -> list[str]:
     return [stop.table or f'stop {number}' for number, stop in enumerate(goal.stops, start=1)]
 
 
+def situation_of(
+    stamp: int,
+    sample: OdometrySample | None,
+    blocked: bool,
+    held: bool,
+    obstacle: tuple[float, float] | None,
+) -> Situation:
+    """Return what a mission knows at `stamp` [ns] from the newest pose and the safety stop."""
+    if sample is None:
+        return Situation(stamp, blocked=blocked, obstacle=obstacle, held=held)
+    position, heading = deviations(sample.pose_covariance)
+    return Situation(stamp, sample.pose, sample.stamp, position, heading, blocked, obstacle, held)
+
+
 def feedback_from_status(
-    status: MissionStatus, words: str, pose: Pose2 | None, stamp: int, frame: str
+    status: MissionStatus, situation: Situation, frame: str
 ) -> Deliver.Feedback:
     """Return the feedback of a delivery under way."""
+    moving = status.state in (MissionState.DRIVING, MissionState.RETURNING)
     feedback = Deliver.Feedback()
-    feedback.state = words
+    feedback.state = status.state.value
+    if moving and situation.blocked:
+        feedback.state = 'stopped for something in the way'
     feedback.stop_index = status.stop_index
     feedback.stop = status.stop
     feedback.distance_left = status.distance_left
-    feedback.pose = goal_to_message(Pose2() if pose is None else pose, stamp, frame)
+    feedback.pose = goal_to_message(situation.pose or Pose2(), situation.stamp, frame)
     return feedback
 
 

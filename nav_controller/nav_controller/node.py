@@ -12,10 +12,10 @@ from rclpy.node import Node
 
 from nav_controller.convert import (
     destinations_from_goal,
-    deviations,
     feedback_from_status,
     plan_to_message,
     safety_from_message,
+    situation_of,
 )
 from nav_controller.deliver_server import DeliverServer
 from nav_controller.params import NavNodeConfig
@@ -25,7 +25,6 @@ from tablerunner.control import (
     MissionState,
     MissionStatus,
     PurePursuit,
-    Situation,
     home_of,
     limits_within,
     make_planner,
@@ -143,7 +142,7 @@ class NavNode(Node):
 
     def _on_timer(self) -> None:
         stamp = now_ns(self)
-        situation = self._situation(stamp)
+        situation = situation_of(stamp, self._sample, *self._safety)
         velocity, status = self._mission.step(situation)
         self._status = status
         self._send(velocity, stamp)
@@ -156,21 +155,7 @@ class NavNode(Node):
             self._deliver.finish(status)
         elif stamp >= self._feedback_due or stamp < self._feedback_due - nanoseconds(10.0):
             self._feedback_due = stamp + nanoseconds(1.0 / self._config.feedback_rate)
-            self._deliver.feedback(
-                feedback_from_status(
-                    status, self._words(), situation.pose, stamp, self._config.map_frame
-                )
-            )
-
-    def _situation(self, stamp: int) -> Situation:
-        blocked, held, obstacle = self._safety
-        sample = self._sample
-        if sample is None:
-            return Situation(stamp, blocked=blocked, obstacle=obstacle, held=held)
-        position, heading = deviations(sample.pose_covariance)
-        return Situation(
-            stamp, sample.pose, sample.stamp, position, heading, blocked, obstacle, held
-        )
+            self._deliver.feedback(feedback_from_status(status, situation, self._config.map_frame))
 
     def _send(self, velocity: Velocity, stamp: int) -> None:
         if self._config.twist_stamped:
@@ -178,12 +163,6 @@ class NavNode(Node):
         else:
             message = velocity_to_twist(velocity)
         self._velocity.publish(message)
-
-    def _words(self) -> str:
-        moving = self._status.state in (MissionState.DRIVING, MissionState.RETURNING)
-        if moving and self._safety[0]:
-            return 'stopped for something in the way'
-        return self._status.state.value
 
     def _configure(self, config: NavNodeConfig) -> None:
         self._config = config
@@ -201,7 +180,7 @@ class NavNode(Node):
         if status.state is MissionState.FAILED:
             report.add(ERROR, status.message)
         elif status.state in (MissionState.BLOCKED, MissionState.LOCALISING, MissionState.HELD):
-            report.add(WARN, self._words())
+            report.add(WARN, status.state.value)
 
 
 def main() -> int:
