@@ -17,6 +17,9 @@ from tablerunner.errors import TablerunnerError
 DOMAINS = range(20, 100)
 """Candidates: domain 0 is everybody's default, and above 101 the ports are the system's."""
 
+LAST_DOMAIN = 232
+"""The last domain for which DDS has ports."""
+
 _PORT_BASE = 7400
 _PORTS_PER_DOMAIN = 250
 _FIRST_PARTICIPANT = 10  # its unicast discovery port, counted from the domain's first
@@ -99,23 +102,27 @@ def acquire(candidates: Iterable[int] = DOMAINS, folder: Path | None = None) -> 
     raise DomainError(f'none of the {len(candidates)} ROS domains is free; give one by --domain')
 
 
-def is_silent(domain: int) -> bool:
-    """Return whether no DDS participant of this machine holds the domain's discovery ports."""
-    first = _PORT_BASE + _PORTS_PER_DOMAIN * domain
-    return all(_is_free(port) for port in (first, first + _FIRST_PARTICIPANT))
-
-
-def check_domain(number: int) -> int:
-    """Return a domain id given by a user.
+def claim(number: int, folder: Path | None = None) -> Domain:
+    """Take the domain that a user names; others may speak in it, but no second simulated robot.
 
     Raises
     ------
     DomainError
-        It is outside 0..232, what the ports of DDS allow.
+        It is outside 0..232, what the ports of DDS allow, or another run holds it.
     """
-    if not 0 <= number <= 232:
-        raise DomainError(f'ROS domain {number}: expected 0 to 232')
-    return number
+    if not 0 <= number <= LAST_DOMAIN:
+        raise DomainError(f'ROS domain {number}: expected 0 to {LAST_DOMAIN}')
+    where = runtime_folder() if folder is None else folder
+    descriptor = _lock(where / f'domain_{number}.lock')
+    if descriptor is None:
+        raise DomainError(f'ROS domain {number} is held by another run: leave --domain out')
+    return Domain(number, descriptor)
+
+
+def is_silent(domain: int) -> bool:
+    """Return whether no DDS participant of this machine holds the domain's discovery ports."""
+    first = _PORT_BASE + _PORTS_PER_DOMAIN * domain
+    return all(_is_free(port) for port in (first, first + _FIRST_PARTICIPANT))
 
 
 def _lock(path: Path) -> int | None:

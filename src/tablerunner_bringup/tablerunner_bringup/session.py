@@ -146,11 +146,11 @@ class Session:
         return os.environ.get('ROS_DOMAIN_ID', '0') if self._domain is None else str(self._domain)
 
     def _choose_domain(self) -> int | None:
-        if self._settings.domain is not None:
-            return domains.check_domain(self._settings.domain)
-        if not self._options.simulated:
+        asked = self._settings.domain
+        if asked is None and not self._options.simulated:
             return None  # a real robot is where its operator looks for it: ROS_DOMAIN_ID
-        return self._stack.enter_context(domains.acquire()).number
+        domain = domains.acquire() if asked is None else domains.claim(asked)
+        return self._stack.enter_context(domain).number
 
     def _environment(self) -> dict[str, str]:
         environment = {**os.environ, 'PYTHONUNBUFFERED': '1', 'RCUTILS_COLORIZED_OUTPUT': '0'}

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from tablerunner_bringup import domains
-from tablerunner_bringup.domains import DomainError, acquire, check_domain, is_silent
+from tablerunner_bringup.domains import DomainError, acquire, claim, is_silent
 
 QUIET = range(60, 66)
 
@@ -67,10 +67,21 @@ def test_release_twice_is_harmless(tmp_path):
 
 
 @pytest.mark.parametrize('number', [-1, 233])
-def test_check_domain_outside_range_is_refused(number):
+def test_claim_outside_range_is_refused(tmp_path, number):
     """The ports of DDS end at domain 232."""
     with pytest.raises(DomainError, match=str(number)):
-        check_domain(number)
+        claim(number, tmp_path)
+
+
+def test_claim_held_domain_is_refused(tmp_path):
+    """Two simulated robots in one domain would drive each other."""
+    with acquire([62], tmp_path):
+        with pytest.raises(DomainError, match='62 is held by another run'):
+            claim(62, tmp_path)
+    with claim(62, tmp_path) as domain:
+        assert domain.number == 62
+        with pytest.raises(DomainError):
+            acquire([62], tmp_path)
 
 
 def test_runtime_folder_foreign_file_is_refused(tmp_path, monkeypatch):
