@@ -75,9 +75,11 @@ def test_claim_outside_range_is_refused(tmp_path, number):
 
 def test_claim_held_domain_is_refused(tmp_path):
     """Two simulated robots in one domain would drive each other."""
-    with acquire([62], tmp_path):
-        with pytest.raises(DomainError, match='62 is held by another run'):
-            claim(62, tmp_path)
+    with (
+        acquire([62], tmp_path),
+        pytest.raises(DomainError, match='62 is held by another run'),
+    ):
+        claim(62, tmp_path)
     with claim(62, tmp_path) as domain:
         assert domain.number == 62
         with pytest.raises(DomainError):
