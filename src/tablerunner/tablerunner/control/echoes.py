@@ -8,7 +8,7 @@ until it fires again, and a little longer because echoes drop out.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ _SIDE_RAD = math.radians(60.0)
 class _Echo:
     stamp: int
     sensor: str
-    points: Vector  # (_ARC_POINTS, 2) in base_link, from right to left; empty: nothing was there
+    points: Vector  # (_ARC_POINTS, 2), dead-reckoned frame, right to left; empty: nothing there
     nearing: bool  # it seemed to come nearer by itself
     confirmed: bool  # the reading before heard the same thing
 
@@ -88,6 +88,7 @@ class EchoMemory:
         }
         self.configure(hold_s, hold_near_s, near_m)
         self._motion = Velocity()
+        self._pose = Pose2()  # of base_link in a frame of its own, dead-reckoned
         self._echoes: list[_Echo] = []
         self._last: dict[str, _Echo] = {}
         self._closing_until: dict[str, int] = {}
@@ -119,6 +120,7 @@ class EchoMemory:
             self._nearing_until[sample.sensor] = sample.stamp + NANOSECONDS // 2
         if closing:
             self._closing_until[sample.sensor] = sample.stamp + NANOSECONDS
+        points = self._pose.transform(points)
         echo = _Echo(sample.stamp, sample.sensor, points, nearing, 0.0 <= speed < math.inf)
         self._echoes.append(echo)
         self._last[sample.sensor] = echo
@@ -170,7 +172,8 @@ class EchoMemory:
         place = np.array([mount.x, mount.y])
         now_m = float(np.linalg.norm(points[0] - place))
         # The nearest point of the old arc: where in the cone the echo came from is not known.
-        before_m = float(np.min(np.linalg.norm(last.points - place, axis=1)))
+        old = self._pose.inverse().transform(last.points)
+        before_m = float(np.min(np.linalg.norm(old - place, axis=1)))
         speed = (before_m - now_m) / apart_s
         if speed > _WALKING_M_S:
             return math.inf
@@ -183,17 +186,11 @@ class EchoMemory:
     def move(self, motion: Velocity, dt: float) -> None:
         """Carry the echoes along while the robot drives with `motion` for `dt` [s]."""
         self._motion = motion
-        if dt <= 0.0 or not self._echoes:
+        if dt <= 0.0:
             return
         turn = motion.angular_rad_s * dt
         step = motion.linear_m_s * dt
-        moved = Pose2(step * math.cos(turn / 2), step * math.sin(turn / 2), turn).inverse()
-        self._echoes = [
-            replace(echo, points=moved.transform(echo.points)) for echo in self._echoes
-        ]
-        for echo in self._echoes:
-            if echo.stamp == self._last[echo.sensor].stamp:
-                self._last[echo.sensor] = echo
+        self._pose = self._pose @ Pose2(step * math.cos(turn / 2), step * math.sin(turn / 2), turn)
 
     def forget(self, now: int) -> None:
         """Drop what is older than the hold times, but never the last reading of a sensor."""
@@ -207,8 +204,9 @@ class EchoMemory:
         age_s = seconds(now - echo.stamp)
         if age_s <= self._hold_s or not echo.confirmed:
             return age_s <= self._hold_s
-        middle = echo.points[len(echo.points) // 2]
-        return age_s <= self._hold_near_s and float(np.hypot(*middle)) <= self._near_m
+        x, y = echo.points[len(echo.points) // 2]
+        away_m = math.hypot(float(x) - self._pose.x, float(y) - self._pose.y)
+        return age_s <= self._hold_near_s and away_m <= self._near_m
 
     def age_s(self, sensor: str, now: int) -> float:
         """Return how long ago a sensor was last heard [s]; inf: never."""
@@ -234,7 +232,7 @@ class EchoMemory:
             for new, echo in zip(newest, kept, strict=True)
         ]
         return Heard(
-            np.concatenate([echo.points for echo in kept]),
+            self._pose.inverse().transform(np.concatenate([echo.points for echo in kept])),
             np.repeat(ages, count),
             np.repeat(closing, count),
             np.repeat(nearing, count),

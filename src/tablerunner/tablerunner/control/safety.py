@@ -19,8 +19,7 @@ from tablerunner.control.safety_config import SafetyConfig
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Refusal, UltrasonicSample, Vector, Velocity, seconds
 
-_STEP_M = 0.02  # spacing of the places that are tried along the way ahead
-_TURN_RATE_MIN = 1e-3
+_LEAST_CURVATURE = 1e-3  # [1/m]
 _SLANT = math.sqrt(2.0)  # something beside the robot may close in at up to 45 degrees
 
 
@@ -322,32 +321,37 @@ class SafetyStop:
         The hull is a disc grown by the side margin. A point already inside the grown disc counts
         only if the robot moves towards it: a wall alongside must not hold a robot that leaves it.
         """
-        config = self.config
-        radius = config.footprint_radius + config.side_margin
-        reach = (
-            0.1
-            + config.margin
-            + stopping_distance(
-                self.limits.max_speed, config.delay, config.deceleration, config.approach_speed
-            )
-            + config.approach_speed * config.ultrasonic_timeout
-        )
-        along = np.arange(0.0, reach + _STEP_M, _STEP_M)
+        radius = self.config.footprint_radius + self.config.side_margin
+        gap = np.linalg.norm(points, axis=1)
         curvature = wanted.angular_rad_s / wanted.linear_m_s
-        turned = along * curvature
-        if abs(curvature) < _TURN_RATE_MIN:
-            centres = np.column_stack([along, np.zeros_like(along)])
-        else:
-            centres = np.column_stack([np.sin(turned), 1.0 - np.cos(turned)]) / curvature
-        # More than half a turn: the way beyond is not where the robot will be next.
-        centres = centres[np.abs(turned) <= math.pi]
-        gap = np.linalg.norm(points[:, None, :] - centres[None], axis=-1)
-        meets = gap < radius
-        inside = meets[:, 0]
-        leaving = inside & (points[:, 0] <= 0.1 * np.maximum(gap[:, 0], 1e-9))
-        meets[leaving] = False
-        first = np.argmax(meets, axis=1)
-        return np.where(meets.any(axis=1), along[first], np.inf)
+        way = _straight(points, radius)
+        if abs(curvature) >= _LEAST_CURVATURE:
+            way = _along_arc(points, radius, curvature)
+        way = np.where(way >= 0.0, way, np.inf)
+        leaving = points[:, 0] <= 0.1 * gap
+        return np.where(gap < radius, np.where(leaving, np.inf, 0.0), way)
+
+
+def _straight(points: Vector, radius: float) -> Vector:
+    """Return how far a disc goes straight on until it meets each point [m]; < 0: behind it."""
+    room = radius**2 - points[:, 1] ** 2
+    return np.asarray(np.where(room > 0.0, points[:, 0] - np.sqrt(np.maximum(room, 0.0)), np.inf))
+
+
+def _along_arc(points: Vector, radius: float, curvature: float) -> Vector:
+    """Return how far a disc goes along an arc, at most half a turn, until it meets each point.
+
+    The arc's centre, the point and the disc's centre at the touch make a triangle of which all
+    sides are known; its angle at the arc's centre is by how much the touch comes before the point.
+    """
+    arc = 1.0 / abs(curvature)
+    across = arc - points[:, 1] * math.copysign(1.0, curvature)
+    away = np.maximum(np.hypot(points[:, 0], across), 1e-9)
+    cosine = (arc**2 + away**2 - radius**2) / (2.0 * arc * away)
+    before = np.arccos(np.clip(cosine, -1.0, 1.0))
+    turned = np.mod(np.arctan2(points[:, 0], across) - before, 2.0 * math.pi)
+    met = (np.abs(cosine) <= 1.0) & (turned <= math.pi)
+    return np.asarray(np.where(met, turned * arc, np.inf))
 
 
 def _holds(config: SafetyConfig) -> tuple[float, float, float]:

@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -334,3 +335,30 @@ def test_full_speed_among_people_hits_nobody(
 
     loop.run(mad, 20.0)
     assert loop.faults == []
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.05, 0.6), st.floats(-1.2, 1.2))
+def test_free_way_is_that_of_a_disc_moved_in_small_steps(
+    x: float, y: float, linear: float, angular: float
+) -> None:
+    """The closed forms for straight lines and arcs agree with pushing a disc along."""
+    stop = SafetyStop(CONFIG, LIMITS, MOUNTS)
+    radius = CONFIG.footprint_radius + CONFIG.side_margin
+    if abs(math.hypot(x, y) - radius) < 5e-3:
+        return
+    found = float(stop._free_ways(np.array([[x, y]]), Velocity(linear, angular))[0])
+    along = np.arange(0.0, 4.0, 2e-3)
+    turned = along * angular / linear
+    half = np.maximum(np.abs(turned) / 2, 1e-12)
+    chord = along * np.sin(half) / half
+    centres = np.column_stack([chord * np.cos(turned / 2), chord * np.sin(turned / 2)])
+    gaps = np.hypot(*(centres - [x, y]).T)[np.abs(turned) <= math.pi]
+    if math.hypot(x, y) < radius:
+        expected = math.inf if x <= 0.1 * math.hypot(x, y) else 0.0
+    else:
+        met = np.flatnonzero(gaps < radius)
+        expected = float(along[met[0]]) if len(met) else math.inf
+    grazing = abs(float(gaps.min()) - radius) < 5e-3
+    at_end = min(abs(found - along[-1]), abs(abs(found * angular / linear) - math.pi)) < 1e-2
+    if not grazing and not at_end and found < along[-1]:
+        assert found == pytest.approx(expected, abs=3e-2)
