@@ -99,6 +99,51 @@ def test_executor_subscriptions_get_every_message_in_order(bench: Bench) -> None
     assert got == list(range(100))
 
 
+def test_executor_backlog_of_two_topics_is_handled_in_order_of_arrival(bench: Bench) -> None:
+    """Two messages on one topic to each on the other, all waiting: none overtakes another."""
+    got: list[int] = []
+
+    def keep(message: Int32) -> None:
+        got.append(message.data)
+
+    # The slow topic first: rclpy's executor would take one of each in turn.
+    bench.node.create_subscription(Int32, 'slow', keep, 100)
+    bench.node.create_subscription(Int32, 'fast', keep, 100)
+    slow = bench.other.create_publisher(Int32, 'slow', 100)
+    fast = bench.other.create_publisher(Int32, 'fast', 100)
+    bench.connect(slow)
+    bench.connect(fast)
+    bench.until(lambda: bench.ticks > 1)  # its first pass has rare work to do, in rclpy's order
+    for number in range(60):
+        (slow if number % 3 == 2 else fast).publish(Int32(data=number))
+    bench.until(lambda: len(got) >= 60)
+    assert got == list(range(60))
+
+
+def test_executor_subscription_destroyed_with_messages_waiting_is_not_called(
+    bench: Bench,
+) -> None:
+    """What waits for a subscription that another's callback destroys is dropped."""
+    got: list[str] = []
+    publisher = bench.other.create_publisher(Int32, 'a', 10)
+    subscriptions = {}
+
+    def callback(name: str, other: str) -> None:
+        got.append(name)
+        if other in subscriptions:
+            bench.node.destroy_subscription(subscriptions.pop(other))
+
+    for name, other in (('first', 'second'), ('second', 'first')):
+        subscriptions[name] = bench.node.create_subscription(
+            Int32, 'a', lambda message, name=name, other=other: callback(name, other), 10
+        )
+    bench.until(lambda: publisher.get_subscription_count() == 2)
+    publisher.publish(Int32())
+    publisher.publish(Int32())
+    bench.until(lambda: len(got) >= 2)
+    assert len(set(got)) == 1
+
+
 def test_executor_subscription_with_info_gets_it(bench: Bench) -> None:
     """A callback of two arguments gets the message's information as well."""
     got: list[Any] = []
