@@ -10,7 +10,7 @@ import numpy as np
 from tablerunner.bags.reader import BagReader
 from tablerunner.bags.replay_config import ReplayConfig
 from tablerunner.bags.storage import Damage
-from tablerunner.bags.streams import bag_records, converters, full_name
+from tablerunner.bags.streams import Names, bag_records, converters, full_name
 from tablerunner.errors import BagError
 from tablerunner.estimation import Localizer, LocalizerState, Outcome
 from tablerunner.evaluation.consistency import SourceSummary, summarize_innovations
@@ -159,10 +159,21 @@ def replay(bag: BagReader, config: ReplayConfig) -> ReplayResult:
         bag,
         run.topics,
         config.namespace,
-        converters(config.left_joint, config.right_joint, config.imu_heading),
+        converters(_names(config)),
     ):
         run.take(topic, received, record)
     return run.result()
+
+
+def _names(config: ReplayConfig) -> Names:
+    return Names(
+        config.left_joint,
+        config.right_joint,
+        config.imu_heading,
+        config.map_frame,
+        config.odom_frame,
+        config.base_frame,
+    )
 
 
 @dataclass
@@ -219,7 +230,8 @@ class _Replay:
 
     def _take_bag_anchors(self) -> None:
         """Use the anchors that the driver announced when the bag was recorded."""
-        for item in bag_records(self._bag, ['uwb/anchors'], self._config.namespace):
+        table = converters(_names(self._config))
+        for item in bag_records(self._bag, ['uwb/anchors'], self._config.namespace, table):
             if isinstance(item.record, tuple) and item.record:
                 self._config = self._config.with_anchors(item.record)
                 return

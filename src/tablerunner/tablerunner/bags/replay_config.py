@@ -30,6 +30,9 @@ class ReplayConfig(Config):
     imu_heading: float = parameter(
         0.0, description="Heading of the IMU's frame in base_link", unit='rad'
     )
+    map_frame: str = parameter('map', description='Frame of anchors and poses; empty: any')
+    odom_frame: str = parameter('odom', description='Frame of odom; empty: any')
+    base_frame: str = parameter('base_link', description='Frame of the robot; empty: any')
     namespace: str = parameter('', description='Namespace of the robot in the bag; empty: none')
     stamp_tolerance: float = parameter(
         0.5,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from tablerunner.bags.reader import BagReader
@@ -29,32 +30,46 @@ class BagRecord(NamedTuple):
     record: Any  # record of tablerunner.types, TruePose, tuple of Anchor, or Refusal
 
 
-def converters(
-    left_joint: str = LEFT_JOINT, right_joint: str = RIGHT_JOINT, imu_heading: float = 0.0
-) -> dict[str, Converter]:
-    """Return how the messages of each contract topic become records, by relative name.
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What messages are expected to be named; an empty frame stands for any.
 
-    Parameters
+    Attributes
     ----------
     left_joint, right_joint : str
         Joints of the drive wheels in joint_states.
     imu_heading : float
         Heading of the IMU's frame in base_link [rad].
+    map_frame, odom_frame, base_frame : str
+        Frames of poses and anchors, of odometry, and of the robot.
     """
+
+    left_joint: str = LEFT_JOINT
+    right_joint: str = RIGHT_JOINT
+    imu_heading: float = 0.0
+    map_frame: str = ''
+    odom_frame: str = ''
+    base_frame: str = ''
+
+
+def converters(names: Names | None = None) -> dict[str, Converter]:
+    """Return how the messages of each contract topic become records, by relative name."""
+    use = names or Names()
+    left, right, heading = use.left_joint, use.right_joint, use.imu_heading
     table: dict[str, Converter] = {
         'uwb/exchanges': exchange_from_message,
         'uwb/ranges': range_from_message,
-        'uwb/anchors': anchors_from_message,
-        'joint_states': lambda message: wheels_from_message(message, left_joint, right_joint),
-        'imu/data': lambda message: imu_from_message(message, imu_heading),
-        'imu/mag': lambda message: magnetic_from_message(message, imu_heading),
+        'uwb/anchors': lambda message: anchors_from_message(message, use.map_frame),
+        'joint_states': lambda message: wheels_from_message(message, left, right),
+        'imu/data': lambda message: imu_from_message(message, heading),
+        'imu/mag': lambda message: magnetic_from_message(message, heading),
         'innovations': innovation_from_message,
         'ground_truth': truth_from_message,
+        'odom': _odometry('odom', use.odom_frame, use.base_frame),
+        'odometry/filtered': _odometry('odometry/filtered', use.map_frame, use.base_frame),
     }
-    for topic in ('odom', 'odometry/filtered'):
-        table[topic] = _odometry(topic)
     for topic in ('uwb/pose', 'camera/pose', 'pose', 'initialpose'):
-        table[topic] = _pose(topic)
+        table[topic] = _pose(topic, use.map_frame)
     for name in ('left', 'left_front', 'front', 'right_front', 'right'):
         table[f'ultrasonic/{name}'] = ultrasonic_from_message
     return table
@@ -96,9 +111,9 @@ def full_name(topic: str, namespace: str = '') -> str:
     return '/' + '/'.join(part for part in (namespace.strip('/'), topic.strip('/')) if part)
 
 
-def _odometry(topic: str) -> Converter:
-    return lambda message: odometry_from_message(message, source=topic)
+def _odometry(topic: str, frame: str, child: str) -> Converter:
+    return lambda message: odometry_from_message(message, frame, child, topic)
 
 
-def _pose(topic: str) -> Converter:
-    return lambda message: pose_from_message(message, '', topic)
+def _pose(topic: str, frame: str) -> Converter:
+    return lambda message: pose_from_message(message, frame, topic)

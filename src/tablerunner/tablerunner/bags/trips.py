@@ -12,7 +12,8 @@ from tablerunner.bags.reader import BagReader
 from tablerunner.bags.replay import ReplayResult
 from tablerunner.bags.streams import bag_records, full_name
 from tablerunner.evaluation.trip import Halt, Trip
-from tablerunner.evaluation.truth import Truth
+from tablerunner.evaluation.truth import Stamps, Truth
+from tablerunner.messages.stamp import stamp_from_message
 from tablerunner.messages.truth import TruePose
 from tablerunner.types import (
     Innovation,
@@ -29,7 +30,10 @@ MOVING = 0.02
 SHORTEST_HALT_S = 0.4
 """Shorter interventions of the safety stop are not shown."""
 
+MAP_FRAME, ODOM_FRAME = 'map', 'odom'
+
 _JOINED_S = 1.0
+_NEAR_S = 0.25
 _TOPICS = (
     'odometry/filtered',
     'ground_truth',
@@ -82,7 +86,7 @@ def trip_of_bag(bag: BagReader, title: str, namespace: str = '') -> Trip | None:
             innovations.append(record)
         elif isinstance(record, tuple):
             anchors = record
-    stamps = np.array(sorted(poses), dtype=np.int64)
+    stamps = _trusted(np.array(sorted(poses), dtype=np.int64), _transform_stamps(bag, namespace))
     chosen = [poses[int(stamp)] for stamp in stamps]
     trip = Trip(
         title,
@@ -98,6 +102,35 @@ def trip_of_bag(bag: BagReader, title: str, namespace: str = '') -> Trip | None:
         tuple(innovations),
     )
     return replace(trip, halts=_halts(bag, trip, namespace))
+
+
+def _transform_stamps(bag: BagReader, namespace: str) -> Stamps:
+    """Return the stamps of the transform from map to odom, which is known while tracking only."""
+    topic = full_name('tf', namespace)
+    found = [
+        stamp_from_message(transform.header.stamp)
+        for item in bag.messages([topic, '/tf'])
+        for transform in item.message.transforms
+        if transform.header.frame_id == MAP_FRAME and transform.child_frame_id == ODOM_FRAME
+    ]
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def _trusted(stamps: Stamps, transforms: Stamps) -> Stamps:
+    """Return the stamps at which the estimator had declared itself initialised.
+
+    odometry/filtered is published before that too, with the variance of a heading that is not
+    known, so that the robot can find its heading by driving. A bag without transforms says
+    nothing about it: all are taken.
+    """
+    if not len(transforms):
+        return stamps
+    right = np.searchsorted(transforms, stamps)
+    before = transforms[(right - 1).clip(0)]
+    after = transforms[right.clip(max=len(transforms) - 1)]
+    nearest = np.minimum(abs(stamps - before), abs(stamps - after))
+    near: Stamps = stamps[nearest <= nanoseconds(_NEAR_S)]
+    return near
 
 
 def _row(item: OdometrySample) -> tuple[float, float, float]:

@@ -24,7 +24,7 @@ def make_app() -> typer.Typer:
     """Return the command with all its commands."""
     app = typer.Typer(
         name='tablerunner',
-        help='Navigation of an indoor delivery robot: run, record, replay, look at what it did.\n\n'
+        help='Navigation of an indoor delivery robot: run it, record it, replay it.\n\n'
         'Exit codes: 0 done, 1 the job failed, 2 bad input.',
         no_args_is_help=True,
         add_completion=False,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,10 +36,10 @@ TOPICS = ('joint_states', 'imu/data', 'imu/mag', 'uwb/exchanges', 'uwb/anchors',
 
 @pytest.fixture(scope='session')
 def restaurant() -> Scenario:
-    """Return the scenario of the demo."""
+    """Return the scenario of the demo without its people: nobody minds our simple driver."""
     if not RESTAURANT.exists():
         pytest.skip('the restaurant scenario is part of tablerunner_bringup, which is not here')
-    return load_scenario(RESTAURANT)
+    return replace(load_scenario(RESTAURANT), people=())
 
 
 @pytest.fixture(scope='session')

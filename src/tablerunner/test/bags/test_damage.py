@@ -129,7 +129,7 @@ def test_bag_cut_anywhere_gives_the_beginning_and_says_so(
     originals: Originals,
     tmp_path: Path,
 ) -> None:
-    """Never an exception, never a message that was not written, and not much less than is there."""
+    """Never an exception, never a message that was not written, and most of what is there."""
     bag = damaged_copy(whole[kind], tmp_path)
     file = storage_file(bag)
     size = file.stat().st_size

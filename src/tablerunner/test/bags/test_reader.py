@@ -275,7 +275,7 @@ def test_bag_single_file_reads_without_folder(full_bag: Path) -> None:
 def test_reader_nothing_there_raises(tmp_path: Path) -> None:
     with pytest.raises(BagError, match='there is no bag'):
         BagReader(tmp_path / 'missing')
-    with pytest.raises(BagError, match='holds no .mcap'):
+    with pytest.raises(BagError, match=r'holds no \.mcap'):
         BagReader(tmp_path)
     (tmp_path / 'notes.txt').write_text('hello')
     with pytest.raises(BagError, match='not a bag'):
