@@ -51,7 +51,12 @@ class VelocityLimits(Config):
             share = top / abs(linear)
         if abs(angular) * share > self.max_turn_rate:
             share = self.max_turn_rate / abs(angular)
-        return Velocity(linear * share, angular * share)
+        turn = self.max_turn_rate
+        # Rounding of the share must not put the product past the limit.
+        return Velocity(
+            min(max(linear * share, -self.max_reverse_speed), self.max_speed),
+            min(max(angular * share, -turn), turn),
+        )
 
     def approach(self, current: Velocity, wanted: Velocity, dt: float) -> Velocity:
         """Return the velocity nearest to `wanted` that can be reached from `current` in `dt` [s].
