@@ -30,6 +30,9 @@ ERROR = DiagnosticStatus.ERROR
 PERIOD_S = 1.0
 """Time between reports, of the steady clock: also while simulated time stands."""
 
+MOST_REASONS = 40
+"""Reasons that a stream keeps apart, keys included: names made of noise must not fill memory."""
+
 LOG_EVERY_NS = 30 * NANOSECONDS
 """A refusal for the same reason is logged again after this long at the soonest."""
 
@@ -135,6 +138,8 @@ class Diagnostics:
         stream.refused += 1
         stream.expected += expected
         reason = f'{refusal.reason} ({refusal.key})' if refusal.key else refusal.reason
+        if reason not in stream.reasons and len(stream.reasons) >= MOST_REASONS:
+            reason = f'{refusal.reason} (others)' if refusal.key else 'others'
         stream.reasons[reason] += 1
         if expected:
             return

@@ -67,8 +67,8 @@ class LeanExecutor(SingleThreadedExecutor):
         return super().shutdown(timeout_sec)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Wait for work and do what is ready; with a time limit, exactly as rclpy does."""
-        if timeout_sec is not None or self._has_tasks():
+        """Wait for work, at most for `timeout_sec`, and do all that is ready."""
+        if self._has_tasks():
             super().spin_once(timeout_sec)
             return
         if self._stale:
@@ -79,7 +79,8 @@ class LeanExecutor(SingleThreadedExecutor):
             add(handle)
         for waitable in self._waitables:
             waitable.add_to_wait_set(wait_set)
-        wait_set.wait(FOREVER_NS)
+        forever = timeout_sec is None or timeout_sec < 0.0
+        wait_set.wait(FOREVER_NS if forever else round(timeout_sec * 1e9))
         if not self._context.ok():
             raise ExternalShutdownException
         if self._is_shutdown:

@@ -184,6 +184,16 @@ def test_diagnostics_same_refusal_is_logged_now_and_then(
     assert len(lines) == 2
 
 
+def test_diagnostics_names_made_of_noise_do_not_fill_memory(desk: Desk) -> None:
+    """A radio that reports garbage for anchors: the count stays whole, the list short."""
+    for number in range(1000):
+        desk.reporter.refuse(Refusal(1, 'uwb/ranges', f'noise{number}', 'unknown anchor'))
+    got = values(desk.report()['mine: uwb/ranges'])
+    assert got['refused'] == '1000'
+    assert int(got['refused: unknown anchor (others)']) > 900
+    assert len(got) < 60
+
+
 def test_diagnostics_come_though_simulated_time_stands(probe: Probe) -> None:  # noqa: F811
     """The timer is steady: a dead simulator is reported, not waited for."""
     node = probe.host(

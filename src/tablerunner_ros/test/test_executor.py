@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -262,6 +263,21 @@ def test_executor_task_from_another_thread_makes_it_return(bench: Bench) -> None
     while not done:
         bench.executor.spin_once()
     thread.join()
+
+
+def test_executor_with_a_time_limit_returns_in_time(bench: Bench) -> None:
+    """Without work it comes back when the time is up, with work at once."""
+    bench.executor.remove_node(bench.other)
+    bench.executor.spin_once(0.0)
+    begun = time.monotonic()
+    while time.monotonic() < begun + 0.1:
+        bench.executor.spin_once(0.05)
+    assert time.monotonic() - begun < 5.0
+    bench.node.create_timer(0.01, lambda: None, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    begun = time.monotonic()
+    for _ in range(5):
+        bench.executor.spin_once(60.0)
+    assert time.monotonic() - begun < 30.0
 
 
 def test_executor_exception_in_callback_is_raised(bench: Bench) -> None:

@@ -11,11 +11,11 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
+from tablerunner_ros.executor import make_executor
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.testing.waiting import LIMIT_S
 
@@ -41,7 +41,7 @@ class Probe:
         self.context = Context()
         rclpy.init(args=[], context=self.context, domain_id=domain)
         self.node = Node(name, context=self.context)
-        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor = make_executor(self.context)
         self._executor.add_node(self.node)
         self._hosted: list[Node] = []
         self._publishers: dict[str, Publisher] = {}
