@@ -29,7 +29,7 @@ class MissionConfig(Config):
         dynamic=True,
     )
     heading_std_found: float = parameter(
-        0.3,
+        0.2,
         description='Finding the heading ends at this standard deviation',
         unit='rad',
         above=0.0,
