@@ -143,7 +143,7 @@ class Robot:
             if self.localizer.status.state is LocalizerState.TRACKING:
                 error = estimate.pose.distance_to(self.simulator.truth.pose)
                 self.errors_m.append(error)
-            else:
+            if situation.heading_std_rad > SafetyConfig().heading_std_slow:
                 self.speed_before_known = max(
                     self.speed_before_known, abs(self.simulator.truth.linear_m_s)
                 )
