@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +38,7 @@ from tablerunner.types import (
 from tablerunner.uwb import Positioner, Ranger
 
 FUTURE = 'stamp in the future'
+TRUTH = 'ground_truth'
 
 
 @dataclass(frozen=True)
@@ -210,6 +213,15 @@ class _Replay:
         self._localizer.set_anchors(anchors)
         self._initialised: int | None = None
         self._first_stamp = 0
+        self._handlers: dict[str, Callable[[Any], None]] = {
+            'joint_states': self._take_wheels,
+            'imu/data': self._take_imu,
+            'odom': self._take_odometry,
+            'uwb/exchanges': self._take_exchange,
+            'uwb/ranges': self._take_range,
+            'camera/pose': self._take_pose,
+            'initialpose': self._take_initial_pose,
+        }
 
     def _choose(self) -> tuple[str, ...]:
         def present(topic: str) -> bool:
@@ -225,7 +237,7 @@ class _Replay:
                 'to replay'
             )
         topics.append(ranges if present(ranges) else 'uwb/ranges')
-        topics += ['camera/pose', 'initialpose', 'ground_truth']
+        topics += ['camera/pose', 'initialpose', TRUTH]
         return tuple(topic for topic in topics if present(topic))
 
     def _take_bag_anchors(self) -> None:
@@ -241,45 +253,49 @@ class _Replay:
                 'scenario file'
             )
 
-    def take(self, topic: str, received: int, record: object) -> None:
+    def take(self, topic: str, received: int, record: Any) -> None:
         """Take one message as the node that subscribes to its topic would."""
-        log = self._log
         if isinstance(record, Refusal):
-            log.refusals[record.source, record.reason] += 1
-            return
-        if isinstance(record, TruePose):
-            log.truth.append(record)
-            return
-        stamp: int = record.stamp  # type: ignore[attr-defined]
-        if not self._first_stamp:
-            self._first_stamp = stamp
-        if stamp > received + self._tolerance:
-            log.refusals[topic, FUTURE] += 1
-        elif isinstance(record, WheelSample):
-            odometry = self._odometer.add_wheels(record)
-            if isinstance(odometry, Refusal):
-                log.refusals[odometry.source, odometry.reason] += 1
-            else:
-                self._note(self._localizer.add_odometry(odometry))
-        elif isinstance(record, ImuSample):
-            refusal = self._odometer.add_imu(record)
-            if refusal is not None:
-                log.refusals[refusal.source, refusal.reason] += 1
-        elif isinstance(record, ExchangeSample):
-            ranged = self._ranger.add(record)
-            if isinstance(ranged, Refusal):
-                log.refusals[ranged.source, ranged.reason] += 1
-            else:
-                self._take_range(ranged)
-        elif isinstance(record, RangeSample):
-            self._take_range(record)
-        elif isinstance(record, OdometrySample):
-            self._note(self._localizer.add_odometry(record))
-        elif isinstance(record, PoseSample):
-            if topic == 'initialpose':
-                self._note(self._localizer.set_pose(record))
-            else:
-                self._note(self._localizer.add_pose(record))
+            self._refuse(record)
+        elif topic == TRUTH:
+            self._log.truth.append(record)
+        elif record.stamp > received + self._tolerance:
+            self._log.refusals[topic, FUTURE] += 1
+        else:
+            if not self._first_stamp:
+                self._first_stamp = record.stamp
+            self._handlers[topic](record)
+
+    def _refuse(self, refusal: Refusal) -> None:
+        self._log.refusals[refusal.source, refusal.reason] += 1
+
+    def _take_wheels(self, sample: WheelSample) -> None:
+        odometry = self._odometer.add_wheels(sample)
+        if isinstance(odometry, Refusal):
+            self._refuse(odometry)
+        else:
+            self._note(self._localizer.add_odometry(odometry))
+
+    def _take_imu(self, sample: ImuSample) -> None:
+        refusal = self._odometer.add_imu(sample)
+        if refusal is not None:
+            self._refuse(refusal)
+
+    def _take_odometry(self, sample: OdometrySample) -> None:
+        self._note(self._localizer.add_odometry(sample))
+
+    def _take_exchange(self, sample: ExchangeSample) -> None:
+        ranged = self._ranger.add(sample)
+        if isinstance(ranged, Refusal):
+            self._refuse(ranged)
+        else:
+            self._take_range(ranged)
+
+    def _take_pose(self, sample: PoseSample) -> None:
+        self._note(self._localizer.add_pose(sample))
+
+    def _take_initial_pose(self, sample: PoseSample) -> None:
+        self._note(self._localizer.set_pose(sample))
 
     def _take_range(self, sample: RangeSample) -> None:
         self._log.ranges.append(sample)
@@ -288,13 +304,13 @@ class _Replay:
             if isinstance(fix, PoseSample):
                 self._log.fixes.append(fix)
             elif isinstance(fix, Refusal):
-                self._log.refusals[fix.source, fix.reason] += 1
+                self._refuse(fix)
         self._note(self._localizer.add_range(sample))
 
     def _note(self, outcome: Outcome) -> None:
         log = self._log
         for refusal in outcome.refusals:
-            log.refusals[refusal.source, refusal.reason] += 1
+            self._refuse(refusal)
         log.innovations.extend(outcome.innovations)
         estimate: Estimate | None = outcome.estimate
         if estimate is None:
