@@ -21,14 +21,14 @@ __all__ = ['domain', 'probe', 'processes']
 ROOM = """\
 name: room
 walls:
-  - {name: hull, closed: true, points: [[0, 0], [9, 0], [9, 5], [0, 5]]}
+  - {name: hull, closed: true, points: [[0, 0], [8, 0], [8, 5], [0, 5]]}
 kitchen: {stop: [1.5, 2.5, 0.0]}
 tables:
-  - {name: table_1, x: 6.5, y: 3.9, stop: [6.5, 2.7, 0.0]}
+  - {name: table_1, x: 5.0, y: 3.9, stop: [5.0, 2.7, 0.0]}
 anchors:
   - {id: A0, position: [0.2, 0.2, 2.25]}
-  - {id: A1, position: [8.8, 0.2, 2.25]}
-  - {id: A2, position: [8.8, 4.8, 2.25]}
+  - {id: A1, position: [7.8, 0.2, 2.25]}
+  - {id: A2, position: [7.8, 4.8, 2.25]}
   - {id: A3, position: [0.2, 4.8, 2.25]}
 """
 UP_LIMIT_S = 60.0

@@ -38,7 +38,7 @@ def test_launch_delivery_reaches_table_and_home(start, room, domain):
 
 def test_launch_two_at_once_do_not_disturb_each_other(start, room):
     """Two runs without a word on domains take one each, and both deliver."""
-    arguments = ('--scenario', str(room), *DELIVER)
+    arguments = ('--scenario', str(room), *DELIVER, '--stay')
     runs = [start(*arguments, '--seed', str(seed), name=f'run_{seed}') for seed in (1, 2)]
     assert [run.wait_end(180.0) for run in runs] == [0, 0]
     domains = {run.process.output.partition('ROS domain ')[2].split()[0] for run in runs}
@@ -48,7 +48,7 @@ def test_launch_two_at_once_do_not_disturb_each_other(start, room):
 def test_launch_unknown_start_finds_itself_and_delivers(start, room, domain):
     """Without a known pose the robot finds its heading by driving, then delivers."""
     run = start(
-        *('--scenario', str(room), *DELIVER, '--unknown-start', '--domain', str(domain)),
+        *('--scenario', str(room), *DELIVER, '--stay', '--unknown-start', '--domain', str(domain)),
         domain=domain,
     )
     assert run.wait_end(180.0) == 0, run.process.output
@@ -58,7 +58,16 @@ def test_launch_unknown_start_finds_itself_and_delivers(start, room, domain):
 def test_launch_namespace_delivers(start, room, domain):
     """All names are relative: in a namespace the robot works the same."""
     run = start(
-        *('--scenario', str(room), *DELIVER, '--namespace', 'robot2', '--domain', str(domain)),
+        *(
+            '--scenario',
+            str(room),
+            *DELIVER,
+            '--stay',
+            '--namespace',
+            'robot2',
+            '--domain',
+            str(domain),
+        ),
         domain=domain,
     )
     assert run.wait_end(120.0) == 0, run.process.output

@@ -96,7 +96,7 @@ def demo(
     real_time_factor: _Factor = 1.0,
     domain: _Domain = None,
     output: Annotated[
-        Path, typer.Option('-o', '--output', help='Folder for the results; emptied first.')
+        Path, typer.Option('-o', '--output', help='Folder for the results; those of before go.')
     ] = Path('out') / 'demo',
 ) -> None:
     """Deliver a meal in the simulated restaurant and judge the trip.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -91,8 +90,9 @@ def demo(options: DemoOptions, progress: Progress) -> int:
     begun = time.monotonic()
     run, scenario = scenario_of(options.run)
     scenario.stop_pose(options.table)
-    shutil.rmtree(options.output, ignore_errors=True)
-    folder = RunFolder(options.output).prepare(run.scenario_path)
+    folder = RunFolder(options.output)
+    folder.clear()
+    folder.prepare(run.scenario_path)
     with Interrupts() as interrupts, progress:
         progress.say(
             f'{scenario.name}: {len(scenario.tables)} tables, {len(scenario.people)} people, '
@@ -111,8 +111,8 @@ def demo(options: DemoOptions, progress: Progress) -> int:
                 scenario,
                 f'{scenario.name}: {scenario_home(scenario)} - {options.table} and back',
                 trip.facts(run.seed, failures),
-                options.output / 'errors.json',
-                options.output / 'trip.png',
+                folder.errors,
+                folder.picture,
             )
             _tell_errors(table, progress)
         except TablerunnerError as error:

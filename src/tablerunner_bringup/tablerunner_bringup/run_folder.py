@@ -38,8 +38,37 @@ class RunFolder:
         """Make the folders inside and copy the scenario into it, for whoever reads the bag."""
         self.logs.mkdir(parents=True, exist_ok=True)
         self.parameters.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(scenario, self.path / 'scenario.yaml')
+        shutil.copyfile(scenario, self.scenario)
         return self
+
+    def clear(self) -> None:
+        """Delete what an earlier run wrote here, and nothing else: a user chose the folder.
+
+        Raises
+        ------
+        OSError
+            Something of it cannot be deleted.
+        """
+        for folder in (self.logs, self.parameters, self.bag):
+            if folder.is_dir():
+                shutil.rmtree(folder)
+        for file in (self.scenario, self.errors, self.picture):
+            file.unlink(missing_ok=True)
+
+    @property
+    def scenario(self) -> Path:
+        """Copy of the scenario."""
+        return self.path / 'scenario.yaml'
+
+    @property
+    def errors(self) -> Path:
+        """Errors of the demo's trip."""
+        return self.path / 'errors.json'
+
+    @property
+    def picture(self) -> Path:
+        """Picture of the demo's trip."""
+        return self.path / 'trip.png'
 
     @property
     def logs(self) -> Path:

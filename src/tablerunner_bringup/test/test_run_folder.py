@@ -29,6 +29,19 @@ def test_run_folder_holds_the_scenario(tmp_path):
     assert folder.logs.is_dir()
 
 
+def test_run_folder_clear_keeps_what_is_not_its_own(tmp_path):
+    """A second demo begins clean, and a folder that a user names keeps the user's files."""
+    scenario = tmp_path / 'scenario_of_user.yaml'
+    scenario.write_text('name: room\n', encoding='utf-8')
+    folder = RunFolder(tmp_path).prepare(scenario)
+    folder.bag.mkdir()
+    for file in (folder.bag / 'bag.mcap', folder.errors, folder.picture, folder.log('node')):
+        file.write_text('old', encoding='utf-8')
+    folder.clear()
+    assert list(tmp_path.iterdir()) == [scenario]
+    folder.clear()
+
+
 def test_find_executable_every_node_is_installed():
     """Each node of the list is where `ros2 run` would find it."""
     for spec in NODES:
