@@ -109,6 +109,9 @@ def test_diagnostics_outliers_at_the_gate_are_no_warning(desk: Desk) -> None:
     assert values(status)['refused: beyond the gate (A1)'] == '1'
     desk.reporter.refuse(Refusal(1, 'uwb/ranges', 'A1', 'beyond the gate'), expected=True)
     assert desk.report()['mine: uwb/ranges'].level == ERROR
+    desk.reporter.take('uwb/ranges', 2)
+    desk.reporter.refuse(Refusal(1, 'uwb/ranges', 'A1', 'negative range'))
+    assert desk.report()['mine: uwb/ranges'].level == WARN
 
 
 def test_diagnostics_watched_stream_warns_before_it_begins_and_errs_when_silent(

@@ -238,6 +238,20 @@ def test_executor_entities_that_come_and_go_are_noticed(bench: Bench) -> None:
     assert set(late) == {2}
 
 
+def test_executor_guard_condition_calls_back(bench: Bench) -> None:
+    """Triggered from another thread, as drivers do."""
+    called: list[int] = []
+    guard = bench.node.create_guard_condition(lambda: called.append(1))
+    bench.executor.spin_once(0.0)
+    thread = threading.Timer(0.05, guard.trigger)
+    thread.start()
+    bench.until(lambda: called)
+    thread.join()
+    end = bench.ticks + 10
+    bench.until(lambda: bench.ticks >= end)
+    assert called == [1]
+
+
 def test_executor_timer_that_is_cancelled_stops(bench: Bench) -> None:
     """A cancelled timer does not fire, nor does it keep the executor busy."""
     fired: list[int] = []

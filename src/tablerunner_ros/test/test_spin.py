@@ -32,6 +32,10 @@ class Sample(Node):
         super().__init__('sample')
         self.config = declare_config(self, Settings)
         self.publisher = self.create_publisher(Int32, 'said', 10)
+        if self.config.fault == 'quiet':
+            self.create_subscription(Int32, 'heard', lambda message: None, 10)
+            self.publisher.publish(Int32(data=1))
+            return
         steady_timer(self, 0.05, self.tick)
         if self.config.fault == 'make':
             raise RuntimeError('cannot be made')
@@ -83,6 +87,19 @@ def test_spin_node_signalled_ends_cleanly_after_a_last_word(
     assert process.wait() == 0
     assert process.output == ''
     assert said[-1].data == 99
+
+
+def test_spin_node_signalled_while_nothing_happens_ends(
+    probe: Probe,  # noqa: F811
+    processes: Processes,  # noqa: F811
+    program: Path,
+) -> None:
+    """A node that waits for a message that never comes is woken by the signal."""
+    process = run(processes, program, '--ros-args', '-p', 'fault:=quiet')
+    probe.wait_for(lambda: probe.node.count_subscribers('heard') > 0, 'the node')
+    probe.spin(0.2)
+    process.send(signal.SIGTERM)
+    assert process.wait(5.0) == 0
 
 
 def test_spin_node_bad_parameter_exits_2_with_one_line(
