@@ -7,6 +7,8 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from tablerunner.errors import ConfigError
+
 
 @dataclass(frozen=True)
 class RunFolder:
@@ -20,7 +22,7 @@ class RunFolder:
 
         Raises
         ------
-        OSError
+        ConfigError
             It cannot be made.
         """
         stamp = dt.datetime.now().astimezone().strftime('%Y-%m-%d_%H-%M-%S')
@@ -32,13 +34,24 @@ class RunFolder:
             except FileExistsError:
                 number += 1
                 continue
+            except OSError as error:
+                raise _unusable(path, error) from error
             return cls(path)
 
     def prepare(self, scenario: Path) -> RunFolder:
-        """Make the folders inside and copy the scenario into it, for whoever reads the bag."""
-        self.logs.mkdir(parents=True, exist_ok=True)
-        self.parameters.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(scenario, self.scenario)
+        """Make the folders inside and copy the scenario into it, for whoever reads the bag.
+
+        Raises
+        ------
+        ConfigError
+            The folder cannot be written.
+        """
+        try:
+            self.logs.mkdir(parents=True, exist_ok=True)
+            self.parameters.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(scenario, self.scenario)
+        except OSError as error:
+            raise _unusable(self.path, error) from error
         return self
 
     def clear(self) -> None:
@@ -46,14 +59,17 @@ class RunFolder:
 
         Raises
         ------
-        OSError
+        ConfigError
             Something of it cannot be deleted.
         """
-        for folder in (self.logs, self.parameters, self.bag):
-            if folder.is_dir():
-                shutil.rmtree(folder)
-        for file in (self.scenario, self.errors, self.picture):
-            file.unlink(missing_ok=True)
+        try:
+            for folder in (self.logs, self.parameters, self.bag):
+                if folder.is_dir():
+                    shutil.rmtree(folder)
+            for file in (self.scenario, self.errors, self.picture):
+                file.unlink(missing_ok=True)
+        except OSError as error:
+            raise _unusable(self.path, error) from error
 
     @property
     def scenario(self) -> Path:
@@ -88,3 +104,8 @@ class RunFolder:
     def log(self, name: str) -> Path:
         """Return the log of a process."""
         return self.logs / f'{name}.log'
+
+
+def _unusable(path: Path, error: OSError) -> ConfigError:
+    reason = error.strerror or error
+    return ConfigError('output', str(path), f'a folder that can be written ({reason})')

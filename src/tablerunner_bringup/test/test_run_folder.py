@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tablerunner.errors import ConfigError
 from tablerunner_bringup.executables import ExecutableError, find_executable
 from tablerunner_bringup.nodes import NODES
 from tablerunner_bringup.run_folder import RunFolder
@@ -40,6 +41,16 @@ def test_run_folder_clear_keeps_what_is_not_its_own(tmp_path):
     folder.clear()
     assert list(tmp_path.iterdir()) == [scenario]
     folder.clear()
+
+
+def test_run_folder_unwritable_place_is_refused(tmp_path):
+    """A file in the folder's place is said in one line."""
+    (tmp_path / 'file').write_text('', encoding='utf-8')
+    scenario = tmp_path / 'file'
+    with pytest.raises(ConfigError, match='a folder that can be written'):
+        RunFolder(tmp_path / 'file').prepare(scenario)
+    with pytest.raises(ConfigError, match='a folder that can be written'):
+        RunFolder.new(tmp_path / 'file', 'room')
 
 
 def test_find_executable_every_node_is_installed():
