@@ -1,4 +1,4 @@
-"""Start the whole robot: ros2 launch tablerunner_bringup delivery.launch.py use_sim:=true.
+"""Start the whole robot: ros2 launch tablerunner_bringup delivery.launch.py simulated:=true.
 
 The nodes and their parameters are those of `tablerunner_bringup.nodes`, which `tablerunner launch`
 uses as well.

@@ -92,7 +92,7 @@ def test_describe_parameters_equal_those_of_the_launcher(tmp_path):
     [
         ('seed', 'many'),
         ('seed', '-1'),
-        ('use_sim', 'maybe'),
+        ('simulated', 'maybe'),
         ('real_time_factor', '0'),
         ('scenario', '/nowhere.yaml'),
     ],
