@@ -22,7 +22,7 @@ PAGE = Path(__file__).parents[2] / 'docs' / 'nodes.md'
 def test_nodes_page_has_the_parameters_of_the_configs() -> None:
     """Made anew the page is the same; else run the command that stands at its top."""
     text = PAGE.read_text(encoding='utf-8')
-    assert fill(text) == text
+    assert fill(text) == text, 'run: python3 -m tablerunner_ros.parameter_table docs/nodes.md'
 
 
 @pytest.mark.parametrize('name', ['uwb_driver', 'odom_node', 'fusion_node'])
