@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+import struct
+from binascii import crc32
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tablerunner.bags import messages
 from tablerunner.bags.contract import CONTRACT
 from tablerunner.bags.definitions import known_types
 from tablerunner.bags.reader import BagReader
+from tablerunner.bags.streams import bag_records
 from tablerunner.bags.writer import STORAGES, BagWriter
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import OdometrySample, RangeSample
@@ -308,3 +313,118 @@ def test_bag_unknown_type_without_definition_is_left_out(tmp_path: Path) -> None
         assert list(reader.messages()) == []
         assert len(list(reader.raw())) == 1
         assert 'nowhere_msgs/msg/Lost: the bag holds no definition of it' in str(reader.damage[0])
+
+
+def rechunk(file: Path, kind: str) -> None:
+    """Write an MCAP file again with its chunks compressed and with checksums, without an end."""
+    data = file.read_bytes()
+    out, here = bytearray(data[:8]), 8
+    while here < len(data) - 8:
+        opcode, length = struct.unpack_from('<BQ', data, here)
+        body = data[here + 9 : here + 9 + length]
+        if opcode == 0x06:
+            raw = body[40:]  # rosbags leaves them uncompressed here
+            packed = lz4.frame.compress(raw) if kind == 'lz4' else raw
+            name = kind.encode()
+            body = (
+                body[:24]
+                + struct.pack('<II', crc32(raw), len(name))
+                + name
+                + struct.pack('<Q', len(packed))
+                + packed
+            )
+        if opcode in (0x01, 0x06, 0x0F):
+            out += struct.pack('<BQ', opcode, len(body)) + body
+        here += 9 + length
+    file.write_bytes(bytes(out))
+
+
+@pytest.mark.parametrize('kind', ['', 'lz4'])
+def test_mcap_chunk_that_contradicts_its_checksum_is_left_out(
+    kind: str, whole: dict[str, Path], originals: Originals, tmp_path: Path
+) -> None:
+    """With checksums a changed byte is noticed: its chunk goes, the others stay."""
+    bag = damaged_copy(whole['mcap'], tmp_path)
+    file = storage_file(bag)
+    rechunk(file, kind)
+    found, lines = read(bag)
+    assert found == originals
+    assert len(lines) == 1
+    assert 'the index at the end' in lines[0]
+    data = bytearray(file.read_bytes())
+    place = data.index(b'uwb_tag', len(data) // 2)
+    data[place] ^= 0x01
+    file.write_bytes(data)
+    found, lines = read(bag)
+    assert COUNT - 250 < len(found) < COUNT
+    assert set(found) < set(originals)
+    assert any('checksum' in line or 'compressed data' in line for line in lines)
+
+
+@pytest.mark.parametrize('offset', [9 + 28, 9 + 32])
+def test_mcap_chunk_whose_head_contradicts_itself_is_passed_over(
+    offset: int, whole: dict[str, Path], originals: Originals, tmp_path: Path
+) -> None:
+    """A wrong length inside the head of the first chunk: the next chunk is found by its shape."""
+    bag = damaged_copy(whole['mcap'], tmp_path)
+    file = storage_file(bag)
+    data = bytearray(file.read_bytes())
+    data[data.index(b'\x06', 20) + offset] ^= 0x40
+    file.write_bytes(data)
+    found, lines = read(bag)
+    assert len(found) > COUNT - 250
+    assert found == originals[-len(found) :]
+    assert any('the head of a chunk' in line for line in lines)
+
+
+def test_mcap_topic_record_lost_says_so(whole: dict[str, Path], tmp_path: Path) -> None:
+    """First chunk and end are gone, and with them what tells which topic a message is of."""
+    bag = damaged_copy(whole['mcap'], tmp_path)
+    file = storage_file(bag)
+    data = bytearray(file.read_bytes())
+    start = data.index(b'\x06', 20)
+    data[start : start + 20] = bytes(20)
+    file.write_bytes(data[: len(data) * 9 // 10])
+    with BagReader(bag) as reader:
+        assert reader.message_count == 0
+        lines = [str(item) for item in reader.damage]
+    assert any('record that names a topic is missing' in line for line in lines)
+    assert any('messages of it cannot be read' in line for line in lines)
+
+
+def test_sqlite_rows_out_of_order_come_once(
+    whole: dict[str, Path], originals: Originals, tmp_path: Path
+) -> None:
+    """Two rows of the last page change places: no row comes twice, and reading ends."""
+    bag = damaged_copy(whole['sqlite3'], tmp_path)
+    file = storage_file(bag)
+    data = bytearray(file.read_bytes())
+    last = originals[-1][2]
+    page = data.index(last) // 4096 * 4096
+    cells = int.from_bytes(data[page + 3 : page + 5], 'big')
+    first, second = page + 8, page + 8 + 2 * (cells - 1)
+    data[first : first + 2], data[second : second + 2] = (
+        data[second : second + 2],
+        data[first : first + 2],
+    )
+    file.write_bytes(data)
+    found, lines = read(bag)
+    assert len(found) == len(set(found)) > COUNT - 20
+    assert set(found) <= set(originals)
+    assert lines
+
+
+def test_bag_definition_of_another_version_is_the_one_used(tmp_path: Path) -> None:
+    """An old bag says itself how its messages are laid out, whatever this program knows."""
+    types = get_typestore(Stores.EMPTY)
+    name = 'tablerunner_interfaces/msg/UwbRange'
+    types.register(get_types_from_msg('string anchor_id\nfloat64 distance\n', name))
+    with BagWriter(tmp_path / 'bag', types=types) as writer:
+        writer.add_topic('uwb/ranges', name)
+        writer.write('uwb/ranges', 1, types.types[name](anchor_id='A0', distance=2.5))
+    with BagReader(tmp_path / 'bag') as reader:
+        (item,) = reader.messages()
+        assert item.message.distance == 2.5
+        assert reader.damage == ()
+        assert list(bag_records(reader, ['uwb/ranges'])) == []
+        assert 'not as this program knows the type' in str(reader.damage[0])

@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import math
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
+from matplotlib.collections import LineCollection
 
 from tablerunner.cli.json_file import write_json
 from tablerunner.errors import ConfigError
 from tablerunner.evaluation.plots import draw_trip
+from tablerunner.evaluation.plots.trip import draw_plan
 from tablerunner.evaluation.trip import Halt, Trip, errors_table
 from tablerunner.evaluation.truth import Truth
 from tablerunner.geometry.pose import Pose2
@@ -105,8 +109,6 @@ def test_draw_trip_in_a_room_writes_a_picture(tmp_path: Path) -> None:
 
 def test_draw_trip_shows_each_part(tmp_path: Path) -> None:
     """Leaving a part out changes the picture: each is really drawn."""
-    from dataclasses import replace
-
     trip = make_trip()
     pictures = {}
     for name, changes in {
@@ -120,6 +122,18 @@ def test_draw_trip_shows_each_part(tmp_path: Path) -> None:
         draw_trip(replace(trip, **changes), None, tmp_path / 'trip.png', dpi=50)
         pictures[name] = (tmp_path / 'trip.png').read_bytes()
     assert len(set(pictures.values())) == len(pictures)
+
+
+def test_draw_plan_draws_a_ray_for_each_range_without_sight() -> None:
+    """Each goes from where the robot was to the anchor."""
+    figure, axes = plt.subplots()
+    axes.set_xlim(0.0, 6.0)
+    draw_plan(axes, make_trip())
+    (rays,) = (item for item in axes.collections if isinstance(item, LineCollection))
+    segments = rays.get_segments()
+    plt.close(figure)
+    assert len(segments) == 50
+    np.testing.assert_allclose(segments[3], [[0.35, 0.0], [0.0, 3.0]])
 
 
 def test_draw_trip_with_nothing_known_still_draws(tmp_path: Path) -> None:

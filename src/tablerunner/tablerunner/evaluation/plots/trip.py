@@ -64,7 +64,7 @@ def draw_trip(trip: Trip, scenario: Scenario | None, file: Path, dpi: int = 150)
         room.set_ylim(low[1], high[1])
         if scenario is not None:
             draw_room(room, scenario)
-        _draw_plan(room, trip)
+        draw_plan(room, trip)
         draw_anchors(room, anchors)
         series = trip.errors()
         _head(figure, trip, series)
@@ -125,7 +125,8 @@ def _head(figure: Any, trip: Trip, series: ErrorSeries) -> None:
     figure.text(left, words_at, '  ·  '.join(words), color=style.SUBDUED, va='center')
 
 
-def _draw_plan(axes: Any, trip: Trip) -> None:
+def draw_plan(axes: Any, trip: Trip) -> None:
+    """Draw what happened into axes whose limits are set: rays, fixes, truth, estimate, halts."""
     _draw_rays(axes, trip)
     if len(trip.fixes):
         axes.plot(
