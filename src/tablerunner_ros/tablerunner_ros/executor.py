@@ -93,14 +93,16 @@ class LeanExecutor(SingleThreadedExecutor):
 
     def _run_ready(self, wait_set: Any) -> None:
         for pointer in wait_set.get_ready_entities('timer'):
-            timer = self._timers[pointer]
-            if timer.handle.is_timer_ready():
+            # None, here and below: it belongs to a waitable (an action has timers and
+            # subscriptions of its own), which says itself that it is ready.
+            timer = self._timers.get(pointer)
+            if timer is not None and timer.handle.is_timer_ready():
                 timer.handle.call_timer()
                 timer.callback()
         rare = False
         ready: list[Subscription] = []
         for pointer in wait_set.get_ready_entities('subscription'):
-            subscription = self._subscriptions[pointer]
+            subscription = self._subscriptions.get(pointer)
             if subscription is None:
                 rare = True
             else:

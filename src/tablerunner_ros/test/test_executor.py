@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 import rclpy
 from rcl_interfaces.srv import GetParameters
+from rclpy.action import ActionClient, ActionServer
+from rclpy.action.server import ServerGoalHandle
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks
@@ -17,6 +19,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
+from tablerunner_interfaces.action import Deliver
 from tablerunner_ros.executor import LeanExecutor, make_executor
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.testing.domain import lease_domain
@@ -178,6 +181,33 @@ def test_executor_service_and_client_work(bench: Bench) -> None:
     future = client.call_async(GetParameters.Request(names=['use_sim_time']))
     bench.until(future.done)
     assert future.result().values[0].bool_value is False
+
+
+def test_executor_action_works_and_outlives_its_results(bench: Bench) -> None:
+    """Goal, feedback, result; then the server's own timer lets the result go."""
+
+    def execute(goal: ServerGoalHandle) -> Deliver.Result:
+        goal.publish_feedback(Deliver.Feedback(state='driving'))
+        goal.succeed()
+        return Deliver.Result(success=True)
+
+    server = ActionServer(bench.node, Deliver, 'deliver', execute, result_timeout=1)
+    client = ActionClient(bench.other, Deliver, 'deliver')
+    bench.until(client.server_is_ready)
+    told: list[str] = []
+    accepted = client.send_goal_async(
+        Deliver.Goal(), lambda message: told.append(message.feedback.state)
+    )
+    bench.until(accepted.done)
+    result = accepted.result().get_result_async()
+    bench.until(lambda: result.done() and told)
+    assert result.result().result.success
+    assert told == ['driving']
+    # A second later the server's timer lets the result go.
+    end = bench.ticks + 150
+    bench.until(lambda: bench.ticks > end)
+    server.destroy()
+    client.destroy()
 
 
 def test_executor_after_rare_work_is_lean_again(
