@@ -21,6 +21,9 @@ from tablerunner_ros.testing.waiting import LIMIT_S
 
 T = TypeVar('T')
 
+ASK_AGAIN_S = 1.0
+"""Wait for an answer of a service before the request is sent once more."""
+
 DEPTH = 1000
 """Queue of what a probe listens to: a busy machine must not make a test lose messages."""
 
@@ -172,7 +175,11 @@ class Probe:
         return '' if result.successful else result.reason or 'refused without a reason'
 
     def get_parameter(self, node: str, name: str) -> Any:
-        """Return a parameter's value (a ParameterValue message) through the node's service."""
+        """Return a parameter's value (a ParameterValue message) through the node's service.
+
+        Afterwards the node knows of everything that this probe had made before: discovery keeps
+        the order.
+        """
         request = GetParameters.Request(names=[name])
         return self._call(GetParameters, f'{node}/get_parameters', request).values[0]
 
@@ -180,9 +187,18 @@ class Probe:
         client = self.node.create_client(type_, service)
         try:
             self.wait_for(client.service_is_ready, f'service {service}')
-            future = client.call_async(request)
-            self.wait_for(future.done, f'an answer of {service}')
-            return future.result()
+            # An answer is lost when the server has not found this client yet: ask again.
+            asked = [client.call_async(request)]
+            end = time.monotonic() + ASK_AGAIN_S
+
+            def answer() -> Any:
+                nonlocal end
+                if time.monotonic() > end:
+                    asked.append(client.call_async(request))
+                    end = time.monotonic() + ASK_AGAIN_S
+                return next((future for future in asked if future.done()), None)
+
+            return self.wait_for(answer, f'an answer of {service}').result()
         finally:
             self.node.destroy_client(client)
 
