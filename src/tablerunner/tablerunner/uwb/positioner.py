@@ -10,7 +10,9 @@ from tablerunner.config import Config, parameter
 from tablerunner.errors import GeometryError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Anchor, PoseSample, RangeSample, Refusal, nanoseconds
-from tablerunner.uwb.multilateration import MINIMUM_RANGES, solve_positions
+from tablerunner.uwb.fix import FixState
+from tablerunner.uwb.solvers.linear import MINIMUM_RANGES
+from tablerunner.uwb.solvers.nonlinear import solve_positions
 
 SOURCE = 'uwb/pose'
 
@@ -87,13 +89,12 @@ class Positioner:
             fix = solve_positions(self._anchors[rows], ranges, std, self.config.tag_height)
         except GeometryError:
             return Refusal(stamp, SOURCE, '', 'anchors in one line')
-        if not np.all(np.isfinite(fix.position)):
-            return Refusal(stamp, SOURCE, '', 'ranges leave the position open')
+        if not fix.solved[0]:
+            return Refusal(stamp, SOURCE, '', FixState(int(fix.state[0])).reason)
         covariance = np.zeros((3, 3))
         covariance[:2, :2] = fix.covariance[0]
         # More scatter than the ranges' own noise explains is NLOS or bias: own up to it.
-        excess = float(fix.residual_rms[0] ** 2 / np.mean(std**2))
-        covariance[:2, :2] *= max(1.0, excess)
+        covariance[:2, :2] *= fix.excess[0]
         covariance[2, 2] = np.inf
         x, y = fix.position[0]
         return PoseSample(stamp, Pose2(float(x), float(y), 0.0), covariance, SOURCE)
