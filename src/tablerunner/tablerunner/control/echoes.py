@@ -23,15 +23,42 @@ _CLOSING_M_S = 0.25  # several times what the noise of two readings makes of a t
 _WALKING_M_S = 2.5  # faster than anybody walks in a room: another thing than before
 _COMPARE_S = 0.5  # readings farther apart are not compared
 _SIDE_RAD = math.radians(60.0)
+_SHARP_M = 0.7
+_WALKER_NS = 10 * NANOSECONDS
+_BEYOND_M = 0.15  # something nearer by this than the echo would have been heard
+_ENOUGH_MISSES = 2
 
 
 @dataclass(frozen=True, slots=True)
-class _Echo:
+class EchoTimes:
+    """How long an echo counts that its sensor does not hear again.
+
+    Attributes
+    ----------
+    hold_s : float
+        Any echo [s].
+    near_s : float
+        One that was heard twice and is near [s].
+    memory_s : float
+        One that was heard twice and not from afar, as long as no sensor looks there and hears
+        nothing [s].
+    near_m : float
+        Distance from base_link that is near [m].
+    """
+
+    hold_s: float
+    near_s: float
+    memory_s: float
+    near_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """The last reading of one sensor."""
+
     stamp: int
-    sensor: str
-    points: Vector  # (_ARC_POINTS, 2), dead-reckoned frame, right to left; empty: nothing there
+    points: Vector  # (_ARC_POINTS, 2), dead-reckoned frame; empty: nothing there
     nearing: bool  # it seemed to come nearer by itself
-    confirmed: bool  # the reading before heard the same thing
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,38 +92,39 @@ class EchoMemory:
     """The last echoes of each sensor, moved with the robot.
 
     A flat thing met at a slant mirrors the sound away, so silence does not prove that what was
-    heard has gone: an echo is kept for a while although the sensor does not hear it again, for
-    longer when it is near.
+    heard has gone; and a corner that was heard ahead leaves the cone before the robot is there. So
+    echoes are remembered, the longer the likelier they are to be true and to matter (`EchoTimes`).
 
     Parameters
     ----------
     mounts : dict of str to Pose2
         Pose of each sensor in base_link, by frame name.
-    hold_s, hold_near_s : float
-        How long an echo counts although the sensor has fired again without it [s].
-    near_m : float
-        Distance from base_link up to which `hold_near_s` counts [m].
+    times : EchoTimes
     """
 
-    def __init__(
-        self, mounts: dict[str, Pose2], hold_s: float, hold_near_s: float, near_m: float
-    ) -> None:
+    def __init__(self, mounts: dict[str, Pose2], times: EchoTimes) -> None:
         self.mounts = dict(mounts)
-        self._beside = {
-            name: abs(difference(mount.heading, 0.0)) >= _SIDE_RAD
-            for name, mount in mounts.items()
-        }
-        self.configure(hold_s, hold_near_s, near_m)
+        self.times = times
+        self._names = tuple(mounts)
+        self._beside = np.array(
+            [abs(difference(mount.heading, 0.0)) >= _SIDE_RAD for mount in mounts.values()]
+        )
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything (time went back)."""
         self._motion = Velocity()
         self._pose = Pose2()  # of base_link in a frame of its own, dead-reckoned
-        self._echoes: list[_Echo] = []
-        self._last: dict[str, _Echo] = {}
+        self._last: dict[str, _Reading] = {}
         self._closing_until: dict[str, int] = {}
         self._nearing_until: dict[str, int] = {}
-
-    def configure(self, hold_s: float, hold_near_s: float, near_m: float) -> None:
-        """Use other times from now on."""
-        self._hold_s, self._hold_near_s, self._near_m = hold_s, hold_near_s, near_m
+        # One row for each point of each echo that is remembered.
+        self._points = np.empty((0, 2))  # in the dead-reckoned frame
+        self._stamps = np.empty(0, dtype=np.int64)
+        self._sensors = np.empty(0, dtype=np.int64)  # index in _names
+        self._confirmed = np.empty(0, dtype=bool)  # the reading before heard the same thing
+        self._sharp = np.empty(0, dtype=bool)  # and near enough to say where it is
+        self._misses = np.empty(0, dtype=np.int64)  # readings that looked there and heard nothing
 
     def add(self, sample: UltrasonicSample, now: int) -> Refusal | None:
         """Take one reading.
@@ -121,10 +149,35 @@ class EchoMemory:
         if closing:
             self._closing_until[sample.sensor] = sample.stamp + NANOSECONDS
         points = self._pose.transform(points)
-        echo = _Echo(sample.stamp, sample.sensor, points, nearing, 0.0 <= speed < math.inf)
-        self._echoes.append(echo)
-        self._last[sample.sensor] = echo
+        self._contradict(sample)
+        count = len(points)
+        number = self._names.index(sample.sensor)
+        self._points = np.concatenate([self._points, points])
+        self._stamps = np.append(self._stamps, np.full(count, sample.stamp))
+        self._sensors = np.append(self._sensors, np.full(count, number))
+        confirmed = 0.0 <= speed < math.inf
+        self._confirmed = np.append(self._confirmed, np.full(count, confirmed))
+        # Farther away the arc is so wide that most of it is where nothing stands; and who came
+        # walking will go away again.
+        walked = self._nearing_until.get(sample.sensor)
+        walking = walked is not None and sample.stamp < walked + _WALKER_NS
+        sharp = confirmed and sample.range_m <= _SHARP_M and not walking
+        self._sharp = np.append(self._sharp, np.full(count, sharp))
+        self._misses = np.append(self._misses, np.zeros(count, dtype=np.int64))
+        self._last[sample.sensor] = _Reading(sample.stamp, points, nearing)
         return None
+
+    def _contradict(self, sample: UltrasonicSample) -> None:
+        """Count a miss for each remembered point in the cone that is nearer than what is heard."""
+        if not len(self._points):
+            return
+        at = self._pose @ self.mounts[sample.sensor]
+        seen = at.inverse().transform(self._points)
+        reach = min(sample.range_m, sample.max_range_m) - _BEYOND_M
+        nearer = np.hypot(seen[:, 0], seen[:, 1]) < reach
+        bearing = np.abs(np.arctan2(seen[:, 1], seen[:, 0]))
+        # The ends of an arc lie on the very edge of the cone.
+        self._misses[nearer & (bearing <= sample.field_of_view_rad / 2.0 + 0.02)] += 1
 
     def _fault(self, sample: UltrasonicSample, now: int) -> str | None:
         if sample.sensor not in self.mounts:
@@ -193,20 +246,25 @@ class EchoMemory:
         self._pose = self._pose @ Pose2(step * math.cos(turn / 2), step * math.sin(turn / 2), turn)
 
     def forget(self, now: int) -> None:
-        """Drop what is older than the hold times, but never the last reading of a sensor."""
-        self._echoes = [echo for echo in self._echoes if self._counts(echo, now)]
+        """Drop what no longer counts, but never the last reading of a sensor."""
+        if not len(self._points):
+            return
+        times = self.times
+        age = (now - self._stamps) / NANOSECONDS
+        away = np.hypot(self._points[:, 0] - self._pose.x, self._points[:, 1] - self._pose.y)
+        kept = (age <= times.hold_s) | self._is_newest()
+        kept |= self._confirmed & (away <= times.near_m) & (age <= times.near_s)
+        kept |= self._sharp & (self._misses < _ENOUGH_MISSES) & (age <= times.memory_s)
+        if not kept.all():
+            self._points, self._stamps = self._points[kept], self._stamps[kept]
+            self._sensors, self._confirmed = self._sensors[kept], self._confirmed[kept]
+            self._sharp, self._misses = self._sharp[kept], self._misses[kept]
 
-    def _counts(self, echo: _Echo, now: int) -> bool:
-        if echo.stamp == self._last[echo.sensor].stamp:
-            return True
-        if not len(echo.points):
-            return False
-        age_s = seconds(now - echo.stamp)
-        if age_s <= self._hold_s or not echo.confirmed:
-            return age_s <= self._hold_s
-        x, y = echo.points[len(echo.points) // 2]
-        away_m = math.hypot(float(x) - self._pose.x, float(y) - self._pose.y)
-        return age_s <= self._hold_near_s and away_m <= self._near_m
+    def _is_newest(self) -> NDArray[np.bool_]:
+        last = np.array(
+            [self._last[name].stamp if name in self._last else 0 for name in self._names]
+        )
+        return np.asarray(self._stamps == last[self._sensors])
 
     def age_s(self, sensor: str, now: int) -> float:
         """Return how long ago a sensor was last heard [s]; inf: never."""
@@ -215,34 +273,18 @@ class EchoMemory:
 
     def heard(self, now: int) -> Heard | None:
         """Return what counts now; None: nothing."""
-        kept = [echo for echo in self._echoes if len(echo.points)]
-        if not kept:
+        if not len(self._points):
             return None
-        count = [len(echo.points) for echo in kept]
-        ages = [max(seconds(now - echo.stamp), 0.0) for echo in kept]
         # An older echo that is still held is taken for a thing at rest: the newer reading tells
         # of what moves.
-        newest = [echo.stamp == self._last[echo.sensor].stamp for echo in kept]
-        closing = [
-            new and self._closing_until.get(echo.sensor, 0) > now
-            for new, echo in zip(newest, kept, strict=True)
-        ]
-        nearing = [
-            new and self._nearing_until.get(echo.sensor, 0) > now
-            for new, echo in zip(newest, kept, strict=True)
-        ]
+        newest = self._is_newest()
+        closing = np.array([self._closing_until.get(name, 0) > now for name in self._names])
+        nearing = np.array([self._nearing_until.get(name, 0) > now for name in self._names])
         return Heard(
-            self._pose.inverse().transform(np.concatenate([echo.points for echo in kept])),
-            np.repeat(ages, count),
-            np.repeat(closing, count),
-            np.repeat(nearing, count),
-            np.repeat([self._beside[echo.sensor] for echo in kept], count),
-            tuple(echo.sensor for echo in kept for _ in range(len(echo.points))),
+            self._pose.inverse().transform(self._points),
+            np.maximum((now - self._stamps) / NANOSECONDS, 0.0),
+            newest & closing[self._sensors],
+            newest & nearing[self._sensors],
+            self._beside[self._sensors],
+            tuple(self._names[number] for number in self._sensors),
         )
-
-    def reset(self) -> None:
-        """Forget everything (time went back)."""
-        self._echoes = []
-        self._last = {}
-        self._closing_until = {}
-        self._nearing_until = {}

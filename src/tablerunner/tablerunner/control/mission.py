@@ -13,6 +13,7 @@ from tablerunner.control.alignment import AlignmentDrive
 from tablerunner.control.controller import Controller, Drive
 from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
 from tablerunner.control.floor_map import Disc
+from tablerunner.control.look_around import LookAround
 from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner
@@ -38,6 +39,7 @@ class _Leg:
     plan_again: int = 0
     plan_tries: int = 0
     blocked_s: float = 0.0
+    stuck: bool = False
 
 
 class Mission:
@@ -77,6 +79,7 @@ class Mission:
         self._aligning = False
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
         self._progress = ProgressWatch()
+        self._look = LookAround(config.replan_after)
         self._marks: list[tuple[int, Disc]] = []  # (until, where)
         self._leg = _Leg(config.replan_after)
 
@@ -192,6 +195,9 @@ class Mission:
             self._state = MissionState.HELD
         elif not self._watch(situation, pose, stop, drive, dt):
             return None
+        elif self._state is MissionState.BLOCKED:
+            look = self._look.step(situation.stamp, situation.blocked and self._leg.stuck)
+            return drive.velocity if look is None else look
         return drive.velocity
 
     def _localise(self, situation: Situation) -> tuple[bool, Velocity | None]:
@@ -269,8 +275,12 @@ class Mission:
         """Look whether the robot gets on; False: the stop was given up."""
         config = self.config
         stuck_s = self._progress.stuck_s(
-            situation.stamp, pose, drive.distance_left, situation.blocked
+            situation.stamp,
+            pose,
+            drive.distance_left,
+            situation.blocked or self._state is MissionState.BLOCKED,
         )
+        self._leg.stuck = stuck_s >= config.look_after
         if stuck_s < config.blocked_after:
             self._state = self._moving
             self._leg.replan_at = config.replan_after

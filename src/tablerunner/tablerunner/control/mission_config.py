@@ -58,6 +58,13 @@ class MissionConfig(Config):
         above=0.0,
         dynamic=True,
     )
+    look_after: float = parameter(
+        4.0,
+        description='Blocked for longer: turn a little to both sides to look around',
+        unit='s',
+        above=0.0,
+        dynamic=True,
+    )
     replan_after: float = parameter(
         8.0,
         description='Blocked for longer: look for a way around',

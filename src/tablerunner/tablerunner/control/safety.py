@@ -13,7 +13,7 @@ from enum import Enum
 import numpy as np
 
 from tablerunner.control.braking import largest_speed, stopping_distance
-from tablerunner.control.echoes import EchoMemory
+from tablerunner.control.echoes import EchoMemory, EchoTimes
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.safety_config import SafetyConfig
 from tablerunner.geometry.pose import Pose2
@@ -92,7 +92,7 @@ class SafetyStop:
     ) -> None:
         self.config = config
         self.limits = limits
-        self._echoes = EchoMemory(mounts, *_holds(config))
+        self._echoes = EchoMemory(mounts, _times(config))
         self._now = 0
         self._last = Velocity()
         self._stopped = False
@@ -105,7 +105,7 @@ class SafetyStop:
         """Use other settings from now on; what was heard stays."""
         self.config = config
         self.limits = limits
-        self._echoes.configure(*_holds(config))
+        self._echoes.times = _times(config)
 
     def add_reading(self, sample: UltrasonicSample, now: int) -> Refusal | None:
         """Take an ultrasonic reading; a refused one counts as silence."""
@@ -308,7 +308,8 @@ class SafetyStop:
         sudden = heard.closing & (gaps < 0.5 * config.near)
         beside = np.where(sudden, 0.0, beside)
         beside = np.maximum(beside, config.creep_speed)
-        speeds = np.minimum(speeds, np.where(heard.beside, beside, np.inf))
+        alongside = heard.beside & (heard.points[:, 0] > -config.footprint_radius)
+        speeds = np.minimum(speeds, np.where(alongside, beside, np.inf))
         best = int(np.argmin(speeds))
         if not np.isfinite(speeds[best]):
             return math.inf, math.inf, None, ''
@@ -354,5 +355,6 @@ def _along_arc(points: Vector, radius: float, curvature: float) -> Vector:
     return np.asarray(np.where(met, turned * arc, np.inf))
 
 
-def _holds(config: SafetyConfig) -> tuple[float, float, float]:
-    return config.hold_time, config.hold_time_near, config.footprint_radius + config.near
+def _times(config: SafetyConfig) -> EchoTimes:
+    near_m = config.footprint_radius + config.near
+    return EchoTimes(config.hold_time, config.hold_time_near, config.memory_time, near_m)

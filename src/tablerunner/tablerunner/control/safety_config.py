@@ -129,6 +129,13 @@ class SafetyConfig(Config):
         low=0.0,
         dynamic=True,
     )
+    memory_time: float = parameter(
+        8.0,
+        description='The same as long as no sensor looks there again and hears nothing',
+        unit='s',
+        low=0.0,
+        dynamic=True,
+    )
     near: float = parameter(
         0.5,
         description='Distance from the hull that counts as near',

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tablerunner.control.echoes import EchoMemory
+from tablerunner.control.echoes import EchoMemory, EchoTimes
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import UltrasonicSample, Velocity, nanoseconds
 
@@ -14,7 +14,7 @@ S = nanoseconds
 
 
 def memory() -> EchoMemory:
-    return EchoMemory(MOUNTS, hold_s=0.6, hold_near_s=3.0, near_m=0.75)
+    return EchoMemory(MOUNTS, EchoTimes(hold_s=0.6, near_s=3.0, memory_s=6.0, near_m=0.75))
 
 
 def reading(time_s: float, distance: float, sensor: str = 'front') -> UltrasonicSample:
@@ -115,11 +115,32 @@ def test_near_echo_heard_twice_is_held_longer_than_one_heard_once() -> None:
         echoes = memory()
         for number in range(count):
             echoes.add(reading(1.0 + 0.15 * number, 0.3), S(1.5))
-        echoes.add(reading(1.5, math.inf), S(1.5))
+        for number in range(3):
+            echoes.add(reading(1.5 + 0.15 * number, math.inf), S(2.0))
         echoes.forget(S(2.5))
         assert (echoes.heard(S(2.5)) is not None) is held
         echoes.forget(S(4.5))
         assert echoes.heard(S(4.5)) is None
+
+
+def test_corner_that_leaves_the_cone_is_remembered_until_the_robot_is_there() -> None:
+    """Heard ahead and to the side, then passed between two cones: it still stands there."""
+    echoes, now = EchoMemory(MOUNTS, EchoTimes(0.6, 0.6, 6.0, 0.75)), 1.0
+    corner, robot = np.array([1.2, 0.12]), 0.0
+    while robot < 0.8:
+        seen = corner - [robot + 0.2, 0.0]
+        inside = abs(math.atan2(seen[1], seen[0])) <= 0.24
+        echoes.add(reading(now, float(np.hypot(*seen)) if inside else math.inf), S(now))
+        echoes.move(Velocity(0.3, 0.0), 0.15)
+        robot, now = robot + 0.045, now + 0.15
+        echoes.forget(S(now))
+    heard = echoes.heard(S(now))
+    assert heard is not None
+    assert np.hypot(*(heard.points - (corner - [robot, 0.0])).T).min() < 0.08
+    # What of the arcs the cone has swept since is known to be free.
+    front = heard.points - [0.2, 0.0]
+    swept = np.abs(np.arctan2(front[:, 1], front[:, 0])) < 0.2
+    assert not swept.any()
 
 
 def approach(speed: float, motion: Velocity, sensor: str = 'front') -> EchoMemory:

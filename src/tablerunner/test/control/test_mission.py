@@ -241,6 +241,20 @@ def test_person_who_stays_is_driven_around() -> None:
     assert any('a way around' in event for event in world.events)
 
 
+def test_blocked_robot_looks_around_to_both_sides() -> None:
+    """What stands between two cones can only be judged when a sensor looks there."""
+    world = World(config=MissionConfig(replan_after=60.0))
+    world.mission.start((TABLE,))
+    world.person = Disc(3.5, 2.5, 0.3)
+    world.until(MissionState.BLOCKED)
+    before, headings = world.pose.heading, []
+    for _ in range(200):
+        world.step()
+        headings.append(world.pose.heading - before)
+    assert max(headings) > 0.4
+    assert min(headings) < -0.4
+
+
 def test_way_blocked_for_long_is_given_up_and_the_next_stop_served() -> None:
     """In a corridor nobody can be driven around: the stop is missed with its reason."""
     parts = np.array([[[4.0, 0.0], [4.0, 2.5]], [[4.0, 3.4], [4.0, 6.0]]])
