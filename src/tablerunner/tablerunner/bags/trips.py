@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from tablerunner.types import (
 )
 
 MOVING = 0.02
-"""Commands below this [m/s, rad/s] count as standing."""
+"""Speeds below this count as standing [m/s]."""
 
 SHORTEST_HALT_S = 0.4
 """Shorter interventions of the safety stop are not shown."""
@@ -34,6 +34,7 @@ MAP_FRAME, ODOM_FRAME = 'map', 'odom'
 
 _JOINED_S = 1.0
 _NEAR_S = 0.25
+_NEAR_M = 1.8  # between the middles of robot and person
 _TOPICS = (
     'odometry/filtered',
     'ground_truth',
@@ -152,39 +153,72 @@ def _halts(bag: BagReader, trip: Trip, namespace: str) -> tuple[Halt, ...]:
     """Find where the controller wanted to drive and the safety stop held the robot.
 
     Commands have no stamp of their own, so that the time of reception stands in for it; the bag
-    must have been recorded on the same clock.
+    must have been recorded on the same clock. Turning on the spot is not held.
     """
-    wanted_topic, given_topic = (
-        full_name(topic, namespace) for topic in ('cmd_vel_nav', 'cmd_vel')
+    spans = [
+        span
+        for span in _joined(_held(bag, namespace))
+        if span[1] - span[0] >= nanoseconds(SHORTEST_HALT_S)
+    ]
+    places = trip.places(begin for begin, _ in spans)
+    people = _people(bag, namespace)
+    return tuple(
+        Halt(begin, seconds(end - begin), float(x), float(y), _nearest(people, begin, end, x, y))
+        for (begin, end), (x, y) in zip(spans, places, strict=True)
+        if math.isfinite(x)
     )
-    wants = False
+
+
+def _held(bag: BagReader, namespace: str) -> Iterator[tuple[int, int]]:
+    """Yield from when to when a speed was wanted and none was given [ns]."""
+    wanted, given = (full_name(topic, namespace) for topic in ('cmd_vel_nav', 'cmd_vel'))
+    speed = {wanted: 0.0, given: 0.0}
     began: int | None = None
-    spans: list[tuple[int, int]] = []
-    last = 0
-    for topic, received, _, message in bag.messages([wanted_topic, given_topic]):
+    received = 0
+    for topic, received, _, message in bag.messages([wanted, given]):
         twist = message.twist if hasattr(message, 'twist') else message
-        moving = max(abs(twist.linear.x), abs(twist.angular.z)) > MOVING
-        if topic == wanted_topic:
-            wants = moving
-        held = wants and not moving if topic == given_topic else began is not None and wants
-        if held and began is None:
+        speed[topic] = abs(twist.linear.x)
+        held = speed[wanted] > MOVING >= speed[given]
+        if held and began is None and topic == given:
             began = received
         elif not held and began is not None:
-            spans.append((began, received))
+            yield began, received
             began = None
-        last = received
     if began is not None:
-        spans.append((began, last))
+        yield began, received
+
+
+def _joined(spans: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return spans with those made one that follow each other closely."""
     joined: list[tuple[int, int]] = []
     for begin, end in spans:
         if joined and begin - joined[-1][1] < nanoseconds(_JOINED_S):
             joined[-1] = (joined[-1][0], end)
         else:
             joined.append((begin, end))
-    long = [span for span in joined if span[1] - span[0] >= nanoseconds(SHORTEST_HALT_S)]
-    places = trip.places(begin for begin, _ in long)
-    return tuple(
-        Halt(begin, seconds(end - begin), float(x), float(y))
-        for (begin, end), (x, y) in zip(long, places, strict=True)
-        if math.isfinite(x)
-    )
+    return joined
+
+
+def _people(bag: BagReader, namespace: str) -> list[tuple[int, list[tuple[float, float]]]]:
+    """Return where everybody was, by stamp; only a simulation knows (topic people)."""
+    return [
+        (
+            stamp_from_message(item.message.header.stamp),
+            [(pose.position.x, pose.position.y) for pose in item.message.poses],
+        )
+        for item in bag.messages([full_name('people', namespace)])
+    ]
+
+
+def _nearest(
+    people: list[tuple[int, list[tuple[float, float]]]], begin: int, end: int, x: float, y: float
+) -> tuple[float, float] | None:
+    """Return who stood nearest during a halt, if anybody stood near."""
+    near = [
+        (math.hypot(place[0] - x, place[1] - y), place)
+        for stamp, places in people
+        if begin <= stamp <= end
+        for place in places
+    ]
+    distance, place = min(near, default=(math.inf, (0.0, 0.0)))
+    return place if distance < _NEAR_M else None

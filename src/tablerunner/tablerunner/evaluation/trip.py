@@ -21,12 +21,13 @@ from tablerunner.types import Anchor, Innovation, LosState, Matrix, RangeSample,
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """A time at which the safety stop held the robot."""
+    """A time at which the robot wanted to drive and the safety stop held it."""
 
     stamp: int  # [ns] when it began
     duration_s: float
     x: float  # [m] in map
     y: float
+    person: tuple[float, float] | None = None  # [m] where somebody stood near; None: nobody did
 
 
 def _no_stamps() -> Stamps:
@@ -70,7 +71,7 @@ class Trip:
     innovations : tuple of Innovation
         What each measurement did.
     halts : tuple of Halt
-        Where the robot stopped for people or things.
+        Where the safety stop held the robot, for people or things.
     """
 
     title: str
@@ -149,6 +150,7 @@ def errors_table(trip: Trip) -> dict[str, Any]:
                 'duration': item.duration_s,
                 'x': item.x,
                 'y': item.y,
+                'for_a_person': item.person is not None,
             }
             for item in trip.halts
         ],

@@ -31,11 +31,22 @@ TOPICS = (
 )  # fmt: skip
 
 
-def write_bag(path: Path, namespace: str = '', transforms: bool = True) -> None:
+def people_message(stamp: int, x: float) -> object:
+    """Return where two people are, one of them far away."""
+    poses = [messages.goal_message(Pose2(place, 1.0, 0.0), stamp, 'map').pose for place in (x, 50)]
+    return messages.make(
+        'geometry_msgs/msg/PoseArray', header=messages.header(stamp, 'map'), poses=poses
+    )
+
+
+def write_bag(
+    path: Path, namespace: str = '', transforms: bool = True, crowd_x: float = 4.0
+) -> None:
     """Write ten seconds of driving along x; the start is known after two, a halt is at five."""
     with BagWriter(path) as bag:
         for topic in TOPICS:
             bag.add_topic(f'{namespace}/{topic}', CONTRACT[topic].msgtype)
+        bag.add_topic(f'{namespace}/people', 'geometry_msgs/msg/PoseArray')
 
         def write(topic: str, stamp: int, message: object) -> None:
             bag.write(f'{namespace}/{topic}', stamp, message)
@@ -58,7 +69,8 @@ def write_bag(path: Path, namespace: str = '', transforms: bool = True) -> None:
                 write('tf', stamp, messages.transforms_message(place))
             held = 5.0 <= time < 6.5 or time == pytest.approx(8.0)
             write('cmd_vel_nav', stamp, messages.twist_message(Velocity(0.5, 0.0)))
-            write('cmd_vel', stamp, messages.twist_message(Velocity(0.0 if held else 0.5, 0.0)))
+            write('cmd_vel', stamp, messages.twist_message(Velocity(0.0 if held else 0.5, 0.3)))
+            write('people', stamp, people_message(stamp, crowd_x - (time - 5.0)))
             los = LosState.NLOS if step % 4 == 0 else LosState.LOS
             sample = RangeSample(stamp, 'A0', 'tag', step, 1.0, 0.01, los=los)
             write('uwb/ranges', stamp, messages.range_message(sample, 'uwb_tag'))
@@ -99,12 +111,20 @@ def test_trip_of_bag_without_transforms_takes_all_estimates(tmp_path: Path) -> N
 
 
 def test_trip_of_bag_finds_where_the_robot_was_stopped(tmp_path: Path) -> None:
-    """One halt of 1.5 s; a single zero command is none."""
+    """One halt of 1.5 s; a single zero command is none, and turning is no driving."""
     write_bag(tmp_path / 'bag')
     (halt,) = read(tmp_path / 'bag').halts
     assert halt.stamp == nanoseconds(5.0)
     assert halt.duration_s == pytest.approx(1.5)
     assert (halt.x, halt.y) == pytest.approx((2.5, 0.0))
+    # Somebody came along from x = 4 m at y = 1 m, and was nearest when the robot went on.
+    assert halt.person == pytest.approx((2.5, 1.0), abs=0.11)
+
+
+def test_trip_of_bag_halt_with_nobody_near_is_for_a_thing(tmp_path: Path) -> None:
+    write_bag(tmp_path / 'bag', crowd_x=20.0)
+    (halt,) = read(tmp_path / 'bag').halts
+    assert halt.person is None
 
 
 def test_trip_of_bag_in_a_namespace(tmp_path: Path) -> None:

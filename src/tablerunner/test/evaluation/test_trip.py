@@ -53,7 +53,7 @@ def make_trip() -> Trip:
             Innovation(int(stamp), 'uwb/ranges', 'A0', True, '', np.zeros(1), np.eye(1), 1.0, 9.0)
             for stamp in stamps
         ),
-        (Halt(int(stamps[50]), 1.5, 2.5, 0.0),),
+        (Halt(int(stamps[50]), 1.5, 2.5, 0.0, (3.0, 0.5)), Halt(int(stamps[80]), 1.0, 4.0, 0.0)),
     )
 
 
@@ -70,7 +70,22 @@ def test_errors_table_by_hand(tmp_path: Path) -> None:
     assert table['sources']['uwb/ranges']['nis'] == pytest.approx(1.0)
     assert table['ranges'] == 100
     assert table['nlos_ranges'] == 50
-    assert table['halts'] == [{'after': pytest.approx(5.0), 'duration': 1.5, 'x': 2.5, 'y': 0.0}]
+    assert table['halts'] == [
+        {
+            'after': pytest.approx(5.0),
+            'duration': 1.5,
+            'x': 2.5,
+            'y': 0.0,
+            'for_a_person': True,
+        },
+        {
+            'after': pytest.approx(8.0),
+            'duration': 1.0,
+            'x': 4.0,
+            'y': 0.0,
+            'for_a_person': False,
+        },
+    ]
     write_json(tmp_path / 'deep' / 'errors.json', table)
     assert json.loads((tmp_path / 'deep' / 'errors.json').read_text())['estimator'] == 'ekf'
 

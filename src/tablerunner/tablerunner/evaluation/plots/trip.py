@@ -25,7 +25,7 @@ _ARROW = 0.04  # the same
 _MOST_RAYS = 160
 _GAP_S = 0.6
 _WIDTH_IN, _LEFT_IN, _RIGHT_IN = 9.0, 0.7, 0.25
-_HEAD_IN, _BETWEEN_IN, _ERRORS_IN, _FOOT_IN = 1.15, 0.85, 1.7, 0.5
+_HEAD_IN, _BETWEEN_IN, _ERRORS_IN, _FOOT_IN = 1.32, 0.85, 1.7, 0.5
 
 
 def draw_trip(trip: Trip, scenario: Scenario | None, file: Path, dpi: int = 150) -> None:
@@ -155,19 +155,7 @@ def draw_plan(axes: Any, trip: Trip) -> None:
         axes.plot(*path.T, color=style.ESTIMATE, lw=1.3, zorder=5, label='estimate')
         _draw_ellipses(axes, trip)
         _draw_ends(axes, trip)
-    if trip.halts:
-        axes.scatter(
-            [halt.x for halt in trip.halts],
-            [halt.y for halt in trip.halts],
-            s=[60.0 + 14.0 * min(halt.duration_s, 15.0) for halt in trip.halts],
-            marker='8',
-            facecolor=style.HALT,
-            edgecolor='white',
-            lw=0.9,
-            alpha=0.95,
-            zorder=6,
-            label='stopped for somebody',
-        )
+    _draw_halts(axes, trip)
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         axes.legend(
@@ -175,12 +163,37 @@ def draw_plan(axes: Any, trip: Trip) -> None:
             labels,
             loc='lower left',
             bbox_to_anchor=(0.0, 1.0),
-            ncols=len(handles),
+            ncols=4,
             handlelength=1.7,
             columnspacing=1.5,
             borderpad=0.0,
             borderaxespad=0.6,
         )
+
+
+def _draw_halts(axes: Any, trip: Trip) -> None:
+    """Draw where the robot was stopped: larger where longer, filled where it was for a person."""
+    for label, halts, face in (
+        ('stopped for a person', [halt for halt in trip.halts if halt.person], style.HALT),
+        ('stopped for a thing', [halt for halt in trip.halts if not halt.person], 'white'),
+    ):
+        if halts:
+            axes.scatter(
+                [halt.x for halt in halts],
+                [halt.y for halt in halts],
+                s=[70.0 + 14.0 * min(halt.duration_s, 15.0) for halt in halts],
+                marker='8',
+                facecolor=face,
+                edgecolor=style.HALT,
+                lw=1.6,
+                zorder=6,
+                label=label,
+            )
+    for halt in trip.halts:
+        if halt.person:
+            line = np.array([(halt.x, halt.y), halt.person])
+            axes.plot(*line.T, color=style.HALT, lw=1.0, ls=(0, (2, 1.5)), zorder=5.8)
+            axes.plot(*halt.person, marker='o', ms=5, color=style.HALT, zorder=5.9)
 
 
 def _draw_rays(axes: Any, trip: Trip) -> None:
@@ -200,7 +213,7 @@ def _draw_rays(axes: Any, trip: Trip) -> None:
         axes.add_collection(
             LineCollection(rays, colors=style.NLOS, linewidths=0.7, alpha=0.16, zorder=2)
         )
-        axes.plot([], [], color=style.NLOS, lw=1.2, alpha=0.6, label='range without line of sight')
+        axes.plot([], [], color=style.NLOS, lw=1.2, alpha=0.6, label='no line of sight')
 
 
 def _draw_ellipses(axes: Any, trip: Trip) -> None:
