@@ -1,4 +1,4 @@
-"""From uwb/exchanges to odometry/filtered through uwb_driver and fusion_node, against two relays."""
+"""From uwb/exchanges to odometry/filtered through our nodes, against two that only relay."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
+import psutil
 from graph import running
 from result import Result
 
@@ -31,6 +32,6 @@ def measure() -> Iterator[Result]:
     )
 
 
-def _used(process) -> float:  # noqa: ANN001 (psutil has no types)
+def _used(process: psutil.Process) -> float:
     times = process.cpu_times()
     return float(times.user + times.system)

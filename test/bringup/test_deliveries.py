@@ -14,7 +14,7 @@ from tablerunner_bringup.nodes import NODES
 pytestmark = pytest.mark.slow
 
 LIMIT_S = 280.0
-"""For a hang, not for speed: a run takes half a minute, and several times that on a busy machine."""
+"""Ends a hang; a run takes half a minute, several times that on a busy machine."""
 
 DELIVER = ('--deliver', 'table_1', '--wait', '0.5')
 RECORDED = ('/odometry/filtered', '/ground_truth', '/uwb/exchanges', '/tf_static', '/uwb/anchors')
