@@ -12,6 +12,7 @@ All functions take integers or integer arrays of any one shape and return floats
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,7 @@ def nlos_probability(
         In [0, 1]; NaN where a power is unknown.
     """
     gap = rx_power_dbm - first_path_power_dbm
-    if not np.isfinite(gap):
-        return float('nan')
-    return float(1.0 / (1.0 + np.exp(-np.clip((gap - centre_db) / width_db, -50.0, 50.0))))
+    if not math.isfinite(gap):
+        return math.nan
+    steps = min(max((gap - centre_db) / width_db, -50.0), 50.0)  # beyond, exp would overflow
+    return 1.0 / (1.0 + math.exp(-steps))
