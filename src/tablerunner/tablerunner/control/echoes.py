@@ -232,7 +232,7 @@ class EchoMemory:
             return math.inf
         # A flat thing at rest that stands at a slant to the way seems to come nearer, too: to a
         # side sensor as fast as the robot passes it, to those between the less.
-        passing = abs(self._motion.linear_m_s) * math.sin(mount.heading) ** 2
+        passing = abs(self._motion.linear_m_s) * math.sin(mount.heading) ** 4
         sweeping = abs(self._motion.angular_rad_s) * before_m
         return max(speed - passing - sweeping, 0.0)
 
