@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import os
+import shutil
 import sys
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
@@ -20,12 +23,13 @@ from tablerunner.bags.labyrinth import convert_labyrinth
 from tablerunner.bags.reader import BagReader
 from tablerunner.bags.replay import Estimates, ReplayResult, replay
 from tablerunner.bags.replay_config import ReplayConfig
+from tablerunner.geometry.angles import wrap
 from tablerunner.scenario import Scenario, load_scenario
 from tablerunner_bringup import parameters
 from tablerunner_bringup.nodes import NODES
-from tablerunner_bringup.run_folder import RunFolder
 from tablerunner_bringup.run_options import RunOptions
 from tablerunner_ros.conversions.odometry import odometry_from_message
+from tablerunner_ros.conversions.pose import pose2_from_message
 from tablerunner_ros.conversions.stamp import stamp_from_message
 from tablerunner_ros.testing.domain import lease_domain
 from tablerunner_ros.testing.probe import Probe
@@ -33,28 +37,15 @@ from tablerunner_ros.testing.process import Process, executable
 
 COMMAND = (sys.executable, '-m', 'tablerunner.cli.main')
 ROOT = Path(__file__).parents[2]
-ROOM = """\
-name: room with people
-walls:
-  - {name: hull, closed: true, points: [[0, 0], [9, 0], [9, 6], [0, 6]]}
-  - {name: partition, points: [[4.6, 6], [4.6, 4.6]]}
-kitchen: {stop: [1.5, 3.2, 0.0]}
-tables:
-  - {name: table_1, x: 6.5, y: 4.9, stop: [6.5, 3.7, 0.0]}
-anchors:
-  - {id: A0, position: [0.2, 0.2, 2.25]}
-  - {id: A1, position: [8.8, 0.2, 2.25]}
-  - {id: A2, position: [8.8, 5.8, 2.25]}
-  - {id: A3, position: [0.2, 5.8, 2.25]}
-people:
-  - {name: waiter, loop: true, route: [[0.8, 0.8], [8.2, 0.8]], speed: 0.9}
-  - {name: guest, loop: true, route: [[8.0, 1.6], [8.0, 5.2]], speed: 0.7, start_share: 0.4}
-"""
+ROOM = Path(__file__).with_name('room.yaml')
+ROUTE = ((4.2, 1.8), (6.8, 1.8), (7.0, 3.6), (4.4, 3.9), (2.0, 3.4), (1.6, 2.2))
+STANDING_S, DRIVING_S = 2.0, 28.0
 PIPELINE = ('uwb_driver', 'odom_node', 'fusion_node')
 PARAMETERS = {spec.name: spec.parameters for spec in NODES}
 SILENT = 'imu silent: heading from the wheels'
 LATE = ('ahead of odometry', 'older than the history')
 """Why ranges are refused when a node was not scheduled in time."""
+TRIES = 4
 ALLOWED = 0.004
 """Share of the messages of one stream that may get lost or be too late: five of some 1200 ranges.
 
@@ -74,7 +65,13 @@ class Drive:
 
     def node_parameters(self, node: str) -> parameters.Parameters:
         """Return the parameters by which the launcher would start a node for this scenario."""
-        return PARAMETERS[node](self.scenario, RunOptions(unknown_start=not self.known_start))
+        options = RunOptions(
+            scenario=str(self.bag.parent / 'scenario.yaml'),
+            seed=3,
+            unknown_start=not self.known_start,
+            real_time_factor=2.0,
+        )
+        return PARAMETERS[node](self.scenario, options)
 
     def replay(self) -> ReplayResult:
         """Run the bag through `replay` with the settings of the same scenario."""
@@ -126,16 +123,25 @@ class Difference:
         Common stamps [ns].
     distances, turns : ndarray, shape (n,)
         Distance [m] and absolute difference of heading [rad].
+    deviations : ndarray, shape (n, 2)
+        Standard deviation of position [m] and heading [rad] as the replay gives them.
     """
 
     stamps: np.ndarray
     distances: np.ndarray
     turns: np.ndarray
+    deviations: np.ndarray
 
     def since(self, stamp: int) -> Difference:
         """Return the part that is later than a stamp [ns]."""
         rows = self.stamps > stamp
-        return Difference(self.stamps[rows], self.distances[rows], self.turns[rows])
+        columns = (self.stamps, self.distances, self.turns, self.deviations)
+        return Difference(*(column[rows] for column in columns))
+
+    def in_deviations(self) -> tuple[float, float]:
+        """Return the largest differences of position and heading in standard deviations."""
+        position, heading = self.deviations.T
+        return float((self.distances / position).max()), float((self.turns / heading).max())
 
     def __str__(self) -> str:
         """Return the percentiles in one line."""
@@ -143,39 +149,75 @@ class Difference:
         for share in (50, 90, 99, 100):
             metres, radians = (np.percentile(v, share) for v in (self.distances, self.turns))
             words.append(f'{share} %: {metres:.2g} m {radians:.2g} rad')
+        position, heading = self.in_deviations()
+        words.append(f'at most {position:.2f} and {heading:.2f} standard deviations')
         return f'{len(self.stamps)} stamps; ' + ', '.join(words)
 
 
 @pytest.fixture(scope='session')
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Drive:
-    """Return a delivery in a room with people, recorded beside the real nodes.
-
-    The launcher records by `tablerunner record`, a process of its own. Whether the delivery
-    succeeds is for test/bringup to ask; here the robot only has to have driven.
-    """
+    """Return half a minute of driving among people, recorded beside the real nodes."""
     home = tmp_path_factory.mktemp('recorded')
-    room = home / 'room.yaml'
-    room.write_text(ROOM, encoding='utf-8')
-    run = RunFolder(home / 'run')
-    with lease_domain() as domain:
-        arguments = ['launch', '--scenario', room, '-o', run.path, '--domain', str(domain)]
-        arguments += ['--deliver', 'table_1', '--wait', '0.5', '--seed', '3']
-        arguments += ['--record', '--real-time-factor', '2']
-        with Process([*COMMAND, *arguments], domain) as launcher:
-            launcher.wait(240.0)
-            output = launcher.output
-    with BagReader(run.bag) as bag:
-        assert not bag.damage, output
-        places = np.array(
-            [
-                (item.message.pose.pose.position.x, item.message.pose.pose.position.y)
-                for item in bag.messages(['/ground_truth'])
-            ]
-        )
-    driven = float(np.hypot(*np.diff(places, axis=0).T).sum())
-    assert driven > 4.0, f'the robot drove {driven:.1f} m only:\n{output}'
+    room = home / 'scenario.yaml'
+    shutil.copyfile(ROOM, room)
     inputs = ('/joint_states', '/imu/data', '/uwb/exchanges')
-    return Drive(run.bag, load_scenario(room), inputs, known_start=True)
+    drive = Drive(home / 'bag', load_scenario(room), inputs, known_start=True)
+    with lease_domain() as domain:
+        arguments = ('record', '-o', drive.bag, '--use-sim-time')
+        with (
+            Process([*COMMAND, *arguments], domain) as recorder,
+            Pipeline(drive, ('sim_bridge', *PIPELINE), domain, home) as probe,
+        ):
+            for topic in (*inputs, '/uwb/anchors', '/odometry/filtered', '/ground_truth'):
+                probe.wait_for(
+                    lambda topic=topic: f'{topic} [' in recorder.output,
+                    f'the recording of {topic}:\n{recorder.output}',
+                    90.0,
+                )
+            drive_around(probe)
+            assert recorder.end() == 0, recorder.output
+    with BagReader(drive.bag) as bag:
+        assert not bag.damage
+        assert {*inputs, '/uwb/anchors'} <= {item.name for item in bag.topics if item.count}
+    return drive
+
+
+def drive_around(probe: Probe) -> None:
+    """Steer the simulated robot by the truth along `ROUTE`; it stands at first and at the end.
+
+    As a controller would, this commands at each message of where the robot is. Where the machine
+    is so busy that it falls silent, the base stops for a while, and no harm is done.
+    """
+    truth = probe.listen(Odometry, 'ground_truth')
+    probe.speak(Twist, 'cmd_vel')
+    probe.connected('cmd_vel', 60.0)
+    probe.wait_for(lambda: truth, 'the robot to be somewhere', 60.0)
+    begun = stamp_from_message(truth[-1].header.stamp)
+    goals = itertools.cycle(ROUTE)
+    goal = next(goals)
+    seen = 0
+
+    def step() -> bool:
+        nonlocal goal, seen
+        if len(truth) == seen:
+            return False
+        seen = len(truth)
+        elapsed_s = (stamp_from_message(truth[-1].header.stamp) - begun) * 1e-9
+        at = pose2_from_message(truth[-1].pose.pose)
+        if math.hypot(goal[0] - at.x, goal[1] - at.y) < 0.4:
+            goal = next(goals)
+        command = Twist()
+        if STANDING_S < elapsed_s < DRIVING_S:
+            turn = wrap(math.atan2(goal[1] - at.y, goal[0] - at.x) - at.heading)
+            command.linear.x = 0.6 * max(0.0, math.cos(turn)) ** 3
+            command.angular.z = max(-1.2, min(1.2, 2.0 * turn))
+        probe.publish('cmd_vel', command)
+        return elapsed_s > DRIVING_S + STANDING_S
+
+    probe.wait_for(step, 'the end of the drive', 300.0)
+    places = np.array([(item.pose.pose.position.x, item.pose.pose.position.y) for item in truth])
+    driven = float(np.hypot(*np.diff(places, axis=0).T).sum())
+    assert driven > 4.0, f'the robot drove {driven:.1f} m only'
 
 
 @pytest.fixture(scope='session')
@@ -201,16 +243,11 @@ def play(tmp_path: Path) -> Callable[..., Played]:
     busy for all messages to be used, the bag is played again, into fresh nodes, at half the rate.
     """
 
-    def play_slower(
-        drive: Drive,
-        rate: float,
-        changes: Mapping[str, parameters.Parameters] | None = None,
-        tries: int = 4,
-    ) -> Played:
-        for number in range(tries):
+    def play_slower(drive: Drive, rate: float) -> Played:
+        for number in range(TRIES):
             folder = tmp_path / f'played_{number}'
             folder.mkdir()
-            result = play_once(drive, rate / 2**number, folder, changes or {})
+            result = play_once(drive, rate / 2**number, folder)
             if not result.losses:
                 return result
             print(f'played at rate {result.rate:g}: ' + '; '.join(result.losses))
@@ -219,13 +256,11 @@ def play(tmp_path: Path) -> Callable[..., Played]:
     return play_slower
 
 
-def play_once(
-    drive: Drive, rate: float, folder: Path, changes: Mapping[str, parameters.Parameters]
-) -> Played:
+def play_once(drive: Drive, rate: float, folder: Path) -> Played:
     """Play the raw topics of a bag into nodes started for it, and listen to the estimate."""
     exchanges = '/uwb/exchanges' in drive.inputs
     nodes = PIPELINE if exchanges else PIPELINE[1:]
-    with lease_domain() as domain, Pipeline(drive, nodes, domain, folder, changes) as probe:
+    with lease_domain() as domain, Pipeline(drive, nodes, domain, folder) as probe:
         heard = probe.listen(Odometry, 'odometry/filtered')
         transforms = probe.listen(TFMessage, 'tf')
         for node in nodes:
@@ -263,20 +298,12 @@ def play_once(
 class Pipeline:
     """Nodes in a domain and a probe beside them; all of it ends with the block."""
 
-    def __init__(
-        self,
-        drive: Drive,
-        nodes: Sequence[str],
-        domain: int,
-        folder: Path,
-        changes: Mapping[str, parameters.Parameters],
-    ) -> None:
+    def __init__(self, drive: Drive, nodes: Sequence[str], domain: int, folder: Path) -> None:
         self._probe = Probe(domain)
         self._processes = []
         for node in nodes:
             file = folder / f'{node}.yaml'
-            told = {**parameters.flat(drive.node_parameters(node)), **changes.get(node, {})}
-            parameters.write(file, node, told)
+            parameters.write(file, node, drive.node_parameters(node))
             command = [executable(node, node), '--ros-args', '--params-file', file]
             self._processes.append(Process(command, domain))
 
@@ -352,6 +379,11 @@ def compare() -> Callable[[Estimates, Played], Difference]:
         theirs = np.array([played.poses[int(settled.stamps[row])] for row in rows])
         apart = (theirs - ours).reshape(len(rows), 3)
         turns = np.abs((apart[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
-        return Difference(settled.stamps[rows], np.hypot(apart[:, 0], apart[:, 1]), turns)
+        variances = np.diagonal(settled.covariances[rows], axis1=1, axis2=2)
+        deviations = np.sqrt(
+            np.stack([variances[:, 0] + variances[:, 1], variances[:, 2]], axis=1)
+        )
+        distances = np.hypot(apart[:, 0], apart[:, 1])
+        return Difference(settled.stamps[rows], distances, turns, deviations)
 
     return at_common_stamps

@@ -86,7 +86,7 @@ def length_s(bag: Path) -> float:
 
 
 @pytest.mark.parametrize(
-    'arguments', [('info',), ('play', '--topics', '/plan', '--no-clock', '--rate', '20')]
+    'arguments', [('info',), ('play', '--topics', '/uwb/anchors', '--no-clock')]
 )
 def test_other_commands_cut_bag_say_what_is_missing(cut, arguments):
     """`info` and `play` use what is there, too, and say the same."""

@@ -28,15 +28,23 @@ that angle times the 12 mm driven meanwhile: 2.4e-6 m, once in a while. The rang
 Measured: 1e-6 m to 1e-5 m, 2e-6 rad to 7e-5 rad.
 """
 
-LARGEST_M, LARGEST_RAD = 0.03, 0.05
-"""No stamp is off by more.
+MOST_M, MOST_RAD = 5e-3, 1e-2
+"""Nine of ten stamps agree so well, and ...
 
 An estimate says what was known when it was published. A range on its way through uwb_driver may
 come after the odometry that follows it; then the estimates published in between lack it, and the
 next one holds it. One range pulls by at most 1.5 (the Huber knee) standard deviations of its
 innovation times the gain: with 3 cm for the pose and 10 cm for the range, 1.5 x 0.03^2 /
-sqrt(0.03^2 + 0.1^2) = 13 mm, and of the four anchors in turn hardly two pull the same way.
-Measured: 8 mm, 0.02 rad.
+sqrt(0.03^2 + 0.1^2) = 13 mm, and mostly by a few millimetres. Measured: 0.02 mm, 0.013 mrad.
+"""
+
+LARGEST_DEVIATIONS = 2.0
+"""... no stamp is off by more, in standard deviations of the estimate.
+
+On a busy machine many ranges may be late at once. What they tell, all together, is the difference
+of two estimates, one that has them and one that lacks them; its covariance is the difference of
+theirs, and so less than the covariance of the one that lacks them, however many there are.
+Measured: 0.3 (15 mm) and 0.4 (9 mrad).
 """
 
 PRESENT = 0.9
@@ -114,8 +122,9 @@ def test_play_over_dds_agrees_with_replay(recorded, play, compare):
     assert found >= PRESENT
     assert np.median(apart.distances) <= TYPICAL_M
     assert np.median(apart.turns) <= TYPICAL_RAD
-    assert apart.distances.max() <= LARGEST_M
-    assert apart.turns.max() <= LARGEST_RAD
+    assert np.percentile(apart.distances, 90) <= MOST_M
+    assert np.percentile(apart.turns, 90) <= MOST_RAD
+    assert max(apart.in_deviations()) <= LARGEST_DEVIATIONS
 
 
 def odometry_stamps(bag: Path) -> list[int]:
