@@ -127,11 +127,11 @@ def _descend(rows: list[Row], x: float, y: float) -> tuple[float, float, Expansi
     damping = 1e-9
     now = _expand(rows, x, y)
     for _ in range(ITERATIONS):
-        cost, gx, gy, a, b, d, na, nb, nd = now
-        added = damping * (na + nd)
+        cost, gx, gy, a, b, d, gauss_a, gauss_b, gauss_d = now
+        added = damping * (gauss_a + gauss_d)
         if not (a * d - b * b > CURVED * (a + d) ** 2 and a + d > 0.0):
-            a, b, d = na, nb, nd
-            added = max(damping, 1e-3) * (na + nd)
+            a, b, d = gauss_a, gauss_b, gauss_d
+            added = max(damping, 1e-3) * (gauss_a + gauss_d)
         a, d = a + added, d + added
         determinant = a * d - b * b
         if not determinant > 0.0:
