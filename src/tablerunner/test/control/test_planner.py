@@ -147,3 +147,16 @@ def test_floor_of_a_whole_town_is_refused() -> None:
 def test_planner_config_with_swapped_clearances_is_refused() -> None:
     with pytest.raises(ConfigError, match='end_clearance'):
         PlannerConfig(clearance=0.1, end_clearance=0.2)
+
+
+def test_plan_that_cares_for_length_only_still_keeps_its_clearance() -> None:
+    """Nothing but the check of the straight line itself keeps corners from being cut here."""
+    thin = np.array([[[4.0, 0.0], [4.0, 4.0]]])
+    floor = FloorMap.build(np.concatenate([WALLS, thin]))
+    planner = Planner(floor, RADIUS, PlannerConfig(comfort_weight=0.0))
+    path = planner.plan(Pose2(2.5, 1.0, 0.0), Pose2(5.5, 1.0, 0.0))
+    points = path.resampled(0.02)
+    gap = distance_to_segments(points, np.concatenate([WALLS, thin])).min()
+    assert gap >= RADIUS + planner.config.clearance - 0.02
+    # Up, over the end of the wall, and down.
+    assert path.length < 2 * math.hypot(1.5 - 0.37, 3.37) + 1.5
