@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from action_msgs.msg import GoalStatus
+from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from tablerunner_bringup.nodes import COMMANDING
 from tablerunner_interfaces.action import Deliver
 from tablerunner_interfaces.msg import Stop
+
+_ASK_AGAIN_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,10 @@ class Delivery:
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._client = ActionClient(node, Deliver, 'deliver')
+        # Made after the action's client: see `is_ready`.
+        self._echo = node.create_client(GetParameters, f'{COMMANDING}/get_parameters')
+        self._ask_at = 0.0
+        self._known = False
         self._handle: Any = None
         self._sent = False
         self.feedback: Any = None
@@ -48,8 +57,20 @@ class Delivery:
 
     @property
     def is_ready(self) -> bool:
-        """Whether the action's server is there."""
-        return bool(self._client.server_is_ready())
+        """Whether the action's server is there and has found this client.
+
+        A server that has not found its client yet loses the answer to a goal. Discovery keeps the
+        order: once a service client that was made after the action's gets an answer from the same
+        node, the action's client is known there too.
+        """
+        if self._known or not (self._client.server_is_ready() and self._echo.service_is_ready()):
+            return self._known
+        if time.monotonic() >= self._ask_at:
+            self._ask_at = time.monotonic() + _ASK_AGAIN_S
+            request = GetParameters.Request(names=['use_sim_time'])
+            self._echo.call_async(request).add_done_callback(self._on_echo)
+        self.spin(0.0)
+        return self._known
 
     def send(self) -> None:
         """Send the goal."""
@@ -70,6 +91,9 @@ class Delivery:
         """Let go of the action."""
         self._client.destroy()
         self._executor.shutdown()
+
+    def _on_echo(self, _future: Any) -> None:
+        self._known = True
 
     def _on_feedback(self, message: Any) -> None:
         self.feedback = message.feedback
