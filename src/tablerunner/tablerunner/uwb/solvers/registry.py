@@ -10,8 +10,13 @@ from numpy.typing import ArrayLike
 from tablerunner.errors import ConfigError
 from tablerunner.uwb.epochs import Epochs
 from tablerunner.uwb.fix import PositionFix, join_fixes
+from tablerunner.uwb.solvers.centroid import solve_centroid, solve_twice_centroid
+from tablerunner.uwb.solvers.hyperbolic import solve_hyperbolic
 from tablerunner.uwb.solvers.linear import solve_linear
 from tablerunner.uwb.solvers.nonlinear import check_layout, solve_nonlinear
+from tablerunner.uwb.solvers.residual_weighted import solve_residual_weighted
+from tablerunner.uwb.solvers.three_circle import solve_three_circle
+from tablerunner.uwb.solvers.two_anchor import solve_two_anchor
 
 Solver = Callable[[Epochs], PositionFix]
 """From checked epochs to their positions."""
@@ -20,6 +25,12 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
     {
         'nonlinear': solve_nonlinear,
         'linear': solve_linear,
+        'three_circle': solve_three_circle,
+        'centroid': solve_centroid,
+        'twice_centroid': solve_twice_centroid,
+        'residual_weighted': solve_residual_weighted,
+        'hyperbolic': solve_hyperbolic,
+        'two_anchor': solve_two_anchor,
     }
 )
 """The solvers by the names under which a parameter chooses them."""
