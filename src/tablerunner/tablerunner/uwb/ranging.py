@@ -114,6 +114,23 @@ def calibrated(range_m: Any, bias_m: Any, scale: Any) -> Any:
     return (range_m - bias_m) / (1.0 + scale)
 
 
+def nlos_corrected(range_m: Any, blocked: Any, offset_m: float) -> Any:
+    """Return the range less a constant where it is blocked (Sun 37).
+
+    Sun switches the constant on where the signal-to-noise ratio is below a threshold; here
+    `blocked` is the decision of any NLOS test.
+
+    Parameters
+    ----------
+    range_m : float or ndarray
+        Calibrated range [m].
+    blocked : bool or ndarray of bool
+    offset_m : float
+        How much too long a blocked range is in this building [m].
+    """
+    return range_m - offset_m * np.asarray(blocked, dtype=float)
+
+
 def nlos_probability(
     rx_power_dbm: float, first_path_power_dbm: float, centre_db: float, width_db: float
 ) -> float:

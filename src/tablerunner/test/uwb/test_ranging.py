@@ -87,3 +87,10 @@ def test_nlos_probability_rises_with_the_power_gap():
     assert at[2] == pytest.approx(0.5)
     assert at[3] > 0.85
     assert math.isnan(ranging.nlos_probability(math.nan, -80.0, 8.0, 1.0))
+
+
+def test_nlos_corrected_takes_the_constant_off_blocked_ranges_only():
+    """A blocked range loses the building's constant, a clear one nothing (Sun 37)."""
+    found = ranging.nlos_corrected(np.array([5.0, 6.0]), np.array([True, False]), 0.4)
+    assert found.tolist() == pytest.approx([4.6, 6.0])
+    assert ranging.nlos_corrected(5.0, True, 0.4) == pytest.approx(4.6)
