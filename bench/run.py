@@ -15,12 +15,14 @@ import latency
 import memory
 import offline
 import processor
+import solvers
 from result import Result
 from rich.console import Console
 from rich.table import Table
 
 BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'filter': filter_step.measure,
+    'solvers': solvers.measure,
     'offline': offline.measure,
     'latency': latency.measure,
     'processor': processor.measure,
