@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tablerunner.errors import GeometryError
-from tablerunner.uwb import Epochs
+from tablerunner.uwb import Epochs, solve_positions
 from tablerunner.uwb.nlos import NlosModel, judge_innovation, judge_residuals
 
 ROOM = np.array(
@@ -56,6 +56,21 @@ def test_judge_residuals_finds_the_blocked_range_of_six():
     verdict = judge_residuals(Epochs.of(ROOM, ranges, 0.1, HEIGHT))
     assert verdict.blocked[np.arange(600), bad].mean() > 0.95
     assert np.mean(np.argmax(verdict.probability, axis=1) == bad) > 0.9
+
+
+def test_judge_residuals_compares_with_the_others_alone():
+    """The innovation is that against the position without the range, with both variances."""
+    ranges = epochs_of(np.random.default_rng(4), 5)
+    probability = judge_residuals(Epochs.of(ROOM, ranges, 0.1, HEIGHT)).probability
+    for j in range(6):
+        others = np.delete(np.arange(6), j)
+        fix = solve_positions(ROOM[others], ranges[:, others], 0.1, HEIGHT)
+        offset = np.column_stack([fix.position, np.full(5, HEIGHT)]) - ROOM[j]
+        expected = np.linalg.norm(offset, axis=1)
+        along = offset[:, :2] / expected[:, None]
+        variance = 0.1**2 + np.einsum('mi,mij,mj->m', along, fix.covariance, along)
+        alone = judge_innovation(ranges[:, j] - expected, variance).probability
+        assert probability[:, j] == pytest.approx(alone, abs=1e-6)
 
 
 def test_judge_residuals_with_three_ranges_has_no_say():

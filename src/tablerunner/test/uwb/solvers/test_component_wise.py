@@ -85,15 +85,43 @@ def test_corrector_one_by_one_equals_all_at_once():
     assert np.concatenate([part.covariance for part in parts]) == pytest.approx(whole.covariance)
 
 
-def test_corrector_covariance_fits_the_errors_without_bias():
-    """Unbiased ranges: the filtered errors have the claimed mean square, lag included."""
-    rng = np.random.default_rng(3)
-    position = circle()
-    epochs = Epochs.of(ANCHORS, measured(position, rng, 0.0), 0.05, HEIGHT)
-    fix = ComponentCorrector(tag_step=0.008).add(epochs)
-    error = fix.filtered - position
-    nees = np.einsum('mi,mij,mj->m', error, np.linalg.inv(fix.covariance), error)
-    assert 1.2 < nees.mean() < 2.6
+def test_corrector_filter_is_that_of_the_formulas():
+    """T_R and T_F follow (12) to (15), with the previous radius under (13)."""
+    ranges = measured(circle(30), np.random.default_rng(5))
+    bias = np.array([0.1, -0.05])
+    fix = ComponentCorrector(bias).add(Epochs.of(ANCHORS, ranges, 0.05, HEIGHT))
+    matrix = np.column_stack([ROBOT, np.full(4, -0.5)])
+    last = None
+    for k, row in enumerate(ranges):
+        x, y, square = np.linalg.lstsq(matrix, 0.5 * (np.sum(ROBOT**2, 1) - row**2), rcond=None)[0]
+        r = np.sqrt(square)
+        corrected = np.array([x, y]) - bias * r
+        radial = r * corrected / np.linalg.norm(corrected)
+        assert fix.radial[k] == pytest.approx(radial)
+        if last is None:
+            last = radial
+        else:
+            before = np.linalg.norm(last)
+            z = (r * last + (before - r) * radial) / before
+            alpha = np.mean(np.abs(np.linalg.norm(radial - ROBOT, axis=1) - row))
+            beta = np.mean(np.abs(np.linalg.norm(z - ROBOT, axis=1) - row))
+            last = (alpha * z + beta * radial) / (alpha + beta)
+        assert fix.filtered[k] == pytest.approx(last)
+
+
+@pytest.mark.parametrize('count', [2000, 40])
+def test_corrector_covariance_fits_the_errors_without_bias(count):
+    """Without bias, errors have about the claimed mean square, lag behind a fast tag included."""
+    position = circle(count)
+    step = 5 * np.pi / count
+    mean = []
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        epochs = Epochs.of(ANCHORS, measured(position, rng, 0.0), 0.05, HEIGHT)
+        fix = ComponentCorrector(tag_step=step).add(epochs)
+        error = fix.filtered - position
+        mean.append(np.einsum('mi,mij,mj->m', error, np.linalg.inv(fix.covariance), error).mean())
+    assert 1.0 < np.mean(mean) < 2.6
 
 
 def test_corrector_missing_epoch_leaves_the_filter_alone():

@@ -1,5 +1,8 @@
 """What holds for every solver: exact on exact ranges, and never silently wrong."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -182,6 +185,17 @@ def test_solver_any_geometry_is_right_or_says_so(name, anchors, place, noise, go
     # Errors up to three standard deviations in every range at once.
     claimed = np.sqrt(np.trace(covariance) * fix.excess[0])
     assert error < 12 * claimed + 0.5 or not fix.consistent(0.05)[0]
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_solver_has_a_page_that_the_docs_link(name):
+    """Every solver stands in the table of docs/ranging.md with a page of its own."""
+    docs = Path(__file__).parents[5] / 'docs'
+    row = re.search(
+        rf'^\| .*`{name}`.*\]\((solvers/\w+\.md)\)', (docs / 'ranging.md').read_text(), re.M
+    )
+    assert row is not None
+    assert f'`{name}`' in (docs / row[1]).read_text().splitlines()[0]
 
 
 def test_solve_unknown_name_lists_those_there_are():

@@ -70,7 +70,7 @@ def test_two_anchor_circles_that_miss_each_other_are_no_fix():
 
 def test_two_anchor_clear_range_shorter_than_its_height_is_no_fix():
     """A range that cannot reach the anchor's height is a contradiction, not a place under it."""
-    ranges = np.array([[1.0, 14.0, 15.0, 15.0]])
+    ranges = np.array([[1.0, 15.1, 15.0, 21.0]])  # the second circle goes through that place
     fix = solve('two_anchor', ROOM, ranges, 0.05, HEIGHT, [0, 0, 1, 1])
     assert fix.state[0] == FixState.NO_MEETING
 
