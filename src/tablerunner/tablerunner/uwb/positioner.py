@@ -43,10 +43,20 @@ class PositionerConfig(Config):
 
 
 class Positioner:
-    """Gathers ranges until every anchor has answered, one answers again, or time is up."""
+    """Gathers ranges until every anchor has answered, one answers again, or time is up.
+
+    Raises
+    ------
+    GeometryError
+        An anchor stands twice among the anchors: its ranges would belong to two places.
+    """
 
     def __init__(self, config: PositionerConfig, anchors: tuple[Anchor, ...]) -> None:
         self.config = config
+        names = [anchor.anchor_id for anchor in anchors]
+        if len(set(names)) < len(names):
+            twice = sorted({name for name in names if names.count(name) > 1})
+            raise GeometryError(f'anchors given twice: {", ".join(twice)}')
         self._order = {anchor.anchor_id: index for index, anchor in enumerate(anchors)}
         self._anchors = np.array([anchor.position for anchor in anchors], dtype=float)
         self._anchors = self._anchors.reshape(-1, 3)

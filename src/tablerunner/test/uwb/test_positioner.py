@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tablerunner.errors import GeometryError
 from tablerunner.types import Anchor, PoseSample, RangeSample, Refusal
 from tablerunner.uwb import Positioner, PositionerConfig
 
@@ -84,3 +85,23 @@ def test_add_unknown_anchor_is_refused():
     result = positioner().add(stranger)
     assert isinstance(result, Refusal)
     assert (result.key, result.reason) == ('B7', 'unknown anchor')
+
+
+def test_positioner_anchor_given_twice_raises():
+    """Two anchors of one name would make ranges ambiguous."""
+    with pytest.raises(GeometryError, match='given twice: A1'):
+        Positioner(PositionerConfig(), (*ANCHORS, ANCHORS[1]))
+
+
+def test_add_ranges_of_anchors_in_line_is_refused_with_the_reason():
+    """Three of five anchors in one line answer: no fix on a guessed side."""
+    line = tuple(Anchor(f'L{i}', (5.0 * i, 0.0, 2.0)) for i in range(3))
+    gatherer = Positioner(PositionerConfig(), (*line, *ANCHORS[2:]))
+    results = [
+        gatherer.add(RangeSample(START + 20_000_000 * i, f'L{i}', 'tag', 0, 5.0, 0.01))
+        for i in range(3)
+    ]
+    results.append(gatherer.add(RangeSample(START + 900_000_000, 'L0', 'tag', 0, 5.0, 0.01)))
+    assert results[:3] == [None, None, None]
+    assert isinstance(results[3], Refusal)
+    assert results[3].reason == 'anchors in one line'
