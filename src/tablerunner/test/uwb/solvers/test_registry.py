@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tablerunner.errors import ConfigError, CovarianceError, GeometryError
@@ -156,7 +156,8 @@ def test_solver_circles_that_do_not_meet_are_found_out(name):
     assert not np.any(fix.consistent(0.001))
 
 
-@pytest.mark.parametrize('name', NAMES)
+# Open fault: with unequal heights the twice centroid can be far off and not say so.
+@pytest.mark.parametrize('name', [name for name in NAMES if name != 'twice_centroid'])
 @settings(max_examples=40, deadline=None)
 @given(
     anchors=st.lists(st.tuples(coordinate, coordinate, height), min_size=3, max_size=6),
@@ -166,8 +167,6 @@ def test_solver_circles_that_do_not_meet_are_found_out(name):
 )
 def test_solver_any_geometry_is_right_or_says_so(name, anchors, place, noise, gone):
     """In any layout, a fix lies where its covariance, residuals and dilution allow."""
-    # Open fault: with anchors of unequal height the twice centroid can be far off and not say so.
-    assume(name != 'twice_centroid')
     layout = np.array(anchors)
     count = len(layout)
     ranges = distances(np.array([place]), layout)[0] + np.array(noise[:count])
