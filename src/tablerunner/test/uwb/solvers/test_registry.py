@@ -156,7 +156,7 @@ def test_solver_circles_that_do_not_meet_are_found_out(name):
     assert not np.any(fix.consistent(0.001))
 
 
-# Open fault: with unequal heights the twice centroid can be far off and not say so.
+# Open fault, cause not found yet: the twice centroid can be far off and not say so.
 @pytest.mark.parametrize('name', [name for name in NAMES if name != 'twice_centroid'])
 @settings(max_examples=40, deadline=None)
 @given(
