@@ -98,12 +98,12 @@ class Ekf:
     def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
         """Return the estimate carried to `stamp` by a motion."""
         moved, coupling, by_input = move(estimate.mean, motion)
-        covariance = transport(estimate.covariance, coupling)
-        covariance[:3, :3] += (by_input * self.config.motion.variances(motion)) @ by_input.T
+        noise = (by_input * self.config.motion.variances(motion)) @ by_input.T
+        covariance = transport(estimate.covariance, coupling, noise)
         walk = self._walk_per_time * motion.dt_s
         walk[SCALE] = self.config.scale_walk**2 * abs(motion.distance_m)
-        covariance.flat[:: self._size + 1] += walk
-        return Estimate(stamp, moved, 0.5 * (covariance + covariance.T))
+        covariance.reshape(-1)[:: self._size + 1] += walk
+        return Estimate(stamp, moved, covariance)
 
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a range or a pose, and what happened."""

@@ -56,6 +56,7 @@ class Localizer:
     def __init__(self, config: LocalizerConfig, anchors: tuple[Anchor, ...] = ()) -> None:
         self.config = config
         self._anchors: tuple[Anchor, ...] = ()
+        self._anchor_ids: frozenset[str] = frozenset()
         self._clear()
         self.set_anchors(anchors)
 
@@ -94,6 +95,7 @@ class Localizer:
         if anchors == self._anchors:
             return
         self._anchors = anchors
+        self._anchor_ids = frozenset(anchor.anchor_id for anchor in anchors)
         self._forget_start()
         if self._timeline is not None:
             newest = self._timeline.newest
@@ -185,8 +187,7 @@ class Localizer:
 
     def add_range(self, sample: RangeSample) -> Outcome:
         """Take a range: correct the estimate, or help to find its start."""
-        known = {anchor.anchor_id for anchor in self._anchors}
-        reason = check_range(sample, known) or self._place_fault(sample.stamp)
+        reason = check_range(sample, self._anchor_ids) or self._place_fault(sample.stamp)
         if reason:
             return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
         if self._timeline is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ class Outline:
         """Whether nothing can stand inside."""
         return self.kind != 'wall'
 
-    @property
+    @cached_property
     def segments(self) -> Array:
         """Its edges, shape (m, 2, 2)."""
         edges = np.stack([self.corners, np.roll(self.corners, -1, axis=0)], axis=1)

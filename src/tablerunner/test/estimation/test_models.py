@@ -57,13 +57,19 @@ def test_move_jacobian_by_input_equals_finite_differences(mean, motion):
 
 @given(STATES, MOTIONS, st.integers(0, 1000))
 def test_transport_equals_the_full_product(mean, motion, seed):
-    """The short form of F P F' is F P F'."""
-    root = np.random.default_rng(seed).normal(size=(len(mean), len(mean)))
+    """The short form of F P F' + Q is F P F' + Q, and symmetric to the last bit."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(len(mean), len(mean)))
     covariance = root @ root.T
+    covariance = 0.5 * (covariance + covariance.T)
+    noise = np.diag(rng.uniform(size=3))
     _, coupling, _ = move(mean, motion)
     jacobian = state_jacobian(coupling, len(mean))
     full = jacobian @ covariance @ jacobian.T
-    assert transport(covariance, coupling) == pytest.approx(full, abs=1e-9)
+    full[:3, :3] += noise
+    moved = transport(covariance, coupling, noise)
+    assert moved == pytest.approx(full, abs=1e-9)
+    assert np.array_equal(moved, moved.T)
 
 
 def test_move_at_standstill_holds_the_heading_against_the_bias():

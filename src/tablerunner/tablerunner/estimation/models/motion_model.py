@@ -71,9 +71,27 @@ def state_jacobian(coupling: Matrix, size: int) -> Matrix:
     return jacobian
 
 
-def transport(covariance: Matrix, coupling: Matrix) -> Matrix:
-    """Return F P F' for F = I + coupling, touching only the rows and columns that change."""
+def transport(covariance: Matrix, coupling: Matrix, noise: Matrix) -> Matrix:
+    """Return F P F' + Q for F = I + coupling, touching only the rows and columns that change.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (n, n)
+        P, symmetric.
+    coupling : ndarray, shape (3, 3)
+        As returned by `move`.
+    noise : ndarray, shape (3, 3)
+        Q of x, y, heading, symmetric; the other states get none here.
+
+    Returns
+    -------
+    moved : ndarray, shape (n, n)
+        Symmetric to the last bit.
+    """
+    rows = covariance[:3] + coupling @ covariance[HEADING:RANGE_BIAS]
+    corner = rows[:, :3] + rows[:, HEADING:RANGE_BIAS] @ coupling.T + noise
     moved: Matrix = covariance.copy()
-    moved[:3] += coupling @ covariance[HEADING:RANGE_BIAS]
-    moved[:, :3] += moved[:, HEADING:RANGE_BIAS] @ coupling.T
+    moved[:3] = rows
+    moved[:, :3] = rows.T
+    moved[:3, :3] = 0.5 * (corner + corner.T)
     return moved
