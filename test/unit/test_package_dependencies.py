@@ -21,14 +21,15 @@ KEYS = {
     'matplotlib': 'python3-matplotlib',
     'mpl_toolkits': 'python3-matplotlib',
     'rich': 'python3-rich',
+    'typer': 'python3-typer',
     'psutil': 'python3-psutil',
     'filterpy': 'python3-filterpy-pip',
     'hypothesis': 'python3-hypothesis',
     'pytest': 'python3-pytest',
 }
-# Without a rosdep key; docs/install.md says how to install rosbags and typer, the others come with
-# them.
-WITHOUT_KEY = {'rosbags', 'lz4', 'backports', 'compression', 'typer', 'click'}
+# Without a rosdep key: docs/install.md says how to install rosbags, which brings lz4; click comes
+# with typer, the others are for Pythons that have no such module of their own.
+WITHOUT_KEY = {'rosbags', 'lz4', 'backports', 'compression', 'click'}
 
 
 def imported(package: Path) -> set[str]:

@@ -1,10 +1,8 @@
 """The commands that need ROS; the core's `tablerunner` command finds them by entry points."""
 
-from __future__ import annotations
-
 import datetime as dt
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -13,14 +11,15 @@ from tablerunner.cli.exits import FAILED
 from tablerunner_bringup.run_options import RunOptions
 
 _Scenario = Annotated[
-    Path | None, typer.Option('--scenario', help='Scenario file; the restaurant when not given.')
+    Optional[Path],
+    typer.Option('--scenario', help='Scenario file; the restaurant when not given.'),
 ]
 _Seed = Annotated[int, typer.Option(min=0, help='Seed of everything that is drawn.')]
 _Factor = Annotated[
     float, typer.Option('--real-time-factor', min=0.01, max=20.0, help='Simulated s per s.')
 ]
 _Domain = Annotated[
-    int | None, typer.Option(help='ROS domain; a simulated run takes a free one of its own.')
+    Optional[int], typer.Option(help='ROS domain; a simulated run takes a free one of its own.')
 ]
 _Estimator = Annotated[str, typer.Option(help='Estimator of fusion_node.')]
 _UnknownStart = Annotated[
@@ -33,7 +32,7 @@ def launch(
     seed: _Seed = 1,
     namespace: Annotated[str, typer.Option(help='Namespace of all nodes.')] = '',
     stops: Annotated[
-        list[str] | None,
+        Optional[list[str]],
         typer.Option('--deliver', help='Table to go to, then end; may be given often.'),
     ] = None,
     wait: Annotated[float, typer.Option(min=0.0, help='Seconds to stand at each table.')] = 3.0,
@@ -42,7 +41,7 @@ def launch(
     ] = True,
     record_bag: Annotated[bool, typer.Option('--record', help='Record all topics.')] = False,
     record_topics: Annotated[
-        list[str] | None, typer.Option('--topics', help='Record only these; * and ? allowed.')
+        Optional[list[str]], typer.Option('--topics', help='Record only these; * and ? allowed.')
     ] = None,
     sim: Annotated[
         bool, typer.Option('--sim/--no-sim', help='Simulate, or drive a real robot.')
@@ -51,12 +50,13 @@ def launch(
     estimator: _Estimator = 'ekf',
     real_time_factor: _Factor = 1.0,
     params: Annotated[
-        list[Path] | None,
+        Optional[list[Path]],
         typer.Option(exists=True, help='ROS parameter file over all others; may be repeated.'),
     ] = None,
     domain: _Domain = None,
     output: Annotated[
-        Path | None, typer.Option('-o', '--output', help='Folder of the run; out/runs/... else.')
+        Optional[Path],
+        typer.Option('-o', '--output', help='Folder of the run; out/runs/... else.'),
     ] = None,
 ) -> None:
     """Start the whole robot, each node a process of its own, until Ctrl-C or the deliveries' end.
@@ -139,13 +139,13 @@ def _run_options(
 
 def record(
     output: Annotated[
-        Path | None, typer.Option('-o', '--output', help='Folder of the bag; must not exist.')
+        Optional[Path], typer.Option('-o', '--output', help='Folder of the bag; must not exist.')
     ] = None,
     storage: Annotated[
         str, typer.Option('--format', help='mcap or sqlite3.', metavar='FORMAT')
     ] = 'mcap',
     topics: Annotated[
-        list[str] | None,
+        Optional[list[str]],
         typer.Option('--topics', help='Topic to record; * and ? allowed; may be given often.'),
     ] = None,
     everything: Annotated[
@@ -158,7 +158,7 @@ def record(
         float, typer.Option(min=0.0, help='End after so many seconds; 0: never.')
     ] = 0.0,
     domain: Annotated[
-        int | None, typer.Option(help='ROS domain; that of ROS_DOMAIN_ID when not given.')
+        Optional[int], typer.Option(help='ROS domain; that of ROS_DOMAIN_ID when not given.')
     ] = None,
 ) -> None:
     """Record topics into a bag, with all message definitions, until Ctrl-C.
@@ -196,25 +196,25 @@ def play(
     rate: Annotated[float, typer.Option(help='Seconds of the bag per second.')] = 1.0,
     start: Annotated[float, typer.Option(min=0.0, help='Begin at this second.')] = 0.0,
     topics: Annotated[
-        list[str] | None,
+        Optional[list[str]],
         typer.Option('--topics', help='Topic to play; * and ? allowed; may be given often.'),
     ] = None,
     remap: Annotated[
-        list[str] | None, typer.Option('--remap', help='OLD:=NEW name of a topic.')
+        Optional[list[str]], typer.Option('--remap', help='OLD:=NEW name of a topic.')
     ] = None,
     clock: Annotated[
         bool, typer.Option('--clock/--no-clock', help='Publish /clock by the times of the bag.')
     ] = True,
     loop: Annotated[bool, typer.Option('--loop', help='Begin again at the end.')] = False,
     wait_for: Annotated[
-        list[str] | None,
+        Optional[list[str]],
         typer.Option('--wait-for', help='Topic that must have a subscriber before the start.'),
     ] = None,
     wait_limit: Annotated[
         float, typer.Option(min=0.0, help='Seconds to wait for them before giving up.')
     ] = 30.0,
     domain: Annotated[
-        int | None, typer.Option(help='ROS domain; that of ROS_DOMAIN_ID when not given.')
+        Optional[int], typer.Option(help='ROS domain; that of ROS_DOMAIN_ID when not given.')
     ] = None,
 ) -> None:
     """Publish a bag with its own quality of service, in its order and at its pace.

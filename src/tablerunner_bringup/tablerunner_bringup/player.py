@@ -25,7 +25,9 @@ _NANOSECONDS = 1_000_000_000
 _CLOCK_STEP_NS = 10_000_000
 _SLICE_S = 0.05  # longest sleep, so that a Ctrl-C is felt
 _SETTLED_S = 0.5
-_DISCOVERY_S = 5.0
+# DDS announces itself a few times at once, then every three seconds: whoever missed the first few
+# is found only then.
+_DISCOVERY_S = 4.0
 _ACKNOWLEDGE_S = 10.0
 
 
@@ -151,6 +153,8 @@ class Player:
         unknown = sorted(set(topics) - set(by_name))
         if unknown:
             raise PlayError(f'{", ".join(unknown)} cannot be waited for: not among what is played')
+        if self._clock_publisher is not None:
+            by_name[CLOCK] = self._clock_publisher
         begun = time.monotonic()
         quiet_since = begun
         seen: list[int] = []
@@ -168,7 +172,8 @@ class Player:
                 if self._node.count_subscribers(name) > count
             ]
             settled = now - quiet_since > _SETTLED_S and now - begun > 2 * _SETTLED_S
-            if not lonely and settled and (not unserved or now - begun > _DISCOVERY_S):
+            found = any(matched) and not unserved
+            if not lonely and settled and (found or now - begun > _DISCOVERY_S):
                 return unserved
             time.sleep(0.02)
         return []

@@ -251,7 +251,9 @@ def test_play_clock_runs_with_the_bag(bag, probe, processes):
     assert 'waited for' in player.output
     player = processes.start(*COMMAND, 'play', folder)
     probe.wait_for(lambda: not player.running, 'the end of the bag', 30.0)
+    assert player.wait() == 0, player.output
     probe.spin(0.2)
+    assert times, player.output
     assert times == sorted(times)
     assert times[0] == start
     assert end - times[-1] < 30_000_000

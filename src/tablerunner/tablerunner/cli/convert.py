@@ -1,7 +1,5 @@
 """`tablerunner convert`: recordings of others as bags of contract topics."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

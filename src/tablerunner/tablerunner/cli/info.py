@@ -1,9 +1,7 @@
 """`tablerunner info`: what a bag holds, and what of it is damaged."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -16,7 +14,7 @@ def info(
         bool, typer.Option('--deep', help='Also decode every message, to find damaged ones.')
     ] = False,
     json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='Write it to a file too.')
+        Optional[Path], typer.Option('--json', metavar='FILE', help='Write it to a file too.')
     ] = None,
 ) -> None:
     """Show what a bag holds, and what of it cannot be read.

@@ -1,9 +1,7 @@
 """`tablerunner plot`: the picture of a trip."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -16,7 +14,7 @@ def plot(
         Path, typer.Option('-o', '--output', metavar='FILE', help='The PNG to write.')
     ] = Path('out/trip.png'),
     scenario: Annotated[
-        Path | None,
+        Optional[Path],
         typer.Option(metavar='F', help='The room; scenario.yaml in or beside BAG if not given.'),
     ] = None,
     title: Annotated[str, typer.Option(help='Title of the picture.')] = '',

@@ -1,10 +1,8 @@
 """`tablerunner replay`: a bag through the estimators, without ROS."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
@@ -22,16 +20,16 @@ def replay(
         str, typer.Option(metavar='E', help='Name of the estimator, e.g. ekf, dead_reckoning.')
     ] = 'ekf',
     scenario: Annotated[
-        Path | None,
+        Optional[Path],
         typer.Option(
             metavar='F', help='Robot and anchors; scenario.yaml in or beside BAG if not given.'
         ),
     ] = None,
     json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='Write the figures to a file.')
+        Optional[Path], typer.Option('--json', metavar='FILE', help='Write the figures to a file.')
     ] = None,
     plot_file: Annotated[
-        Path | None, typer.Option('--plot', metavar='FILE', help='Draw the trip as a PNG.')
+        Optional[Path], typer.Option('--plot', metavar='FILE', help='Draw the trip as a PNG.')
     ] = None,
     start: Annotated[
         str,
@@ -78,7 +76,7 @@ def replay(
         raise typer.Exit(FAILED)
 
 
-def figures(result: ReplayResult, bag: Path, took_s: float) -> dict[str, Any]:
+def figures(result: 'ReplayResult', bag: Path, took_s: float) -> dict[str, Any]:
     """Return what ``--json`` writes; lengths in m, times in s."""
     summary = result.errors.summary()
     sources = result.by_source()
@@ -105,7 +103,7 @@ def figures(result: ReplayResult, bag: Path, took_s: float) -> dict[str, Any]:
     }
 
 
-def report(result: ReplayResult, bag: Path, took_s: float) -> list[str]:
+def report(result: 'ReplayResult', bag: Path, took_s: float) -> list[str]:
     """Return the lines for people."""
     inputs = [topic for topic in result.sources if topic != 'ground_truth']
     lines = [f'bag            {bag}: {result.data_s:.1f} s of ' + ', '.join(inputs)]
@@ -131,7 +129,7 @@ def report(result: ReplayResult, bag: Path, took_s: float) -> list[str]:
     return lines
 
 
-def _initialised_after(result: ReplayResult) -> float | None:
+def _initialised_after(result: 'ReplayResult') -> float | None:
     if result.initialised is None:
         return None
     first = int(result.first_stamp)
