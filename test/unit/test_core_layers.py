@@ -23,6 +23,7 @@ PARTS = [
     'simulation',
     'evaluation',
     'bags',
+    'experiments',
     'cli',
 ]
 # Beyond the order: the controller works with any estimate, and the simulator must not share a

@@ -14,6 +14,7 @@ from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
 from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
+from tablerunner.cli.reproduce import reproduce
 from tablerunner.errors import BagError, ConfigError, TablerunnerError
 
 GROUP = 'tablerunner.commands'
@@ -34,6 +35,7 @@ def make_app() -> typer.Typer:
     app.command()(replay)
     app.command()(info)
     app.command()(plot)
+    app.command()(reproduce)
     app.add_typer(convert_app, name='convert')
     for entry in sorted(entry_points(group=GROUP), key=lambda item: item.name):
         _add(app, entry)
