@@ -75,11 +75,15 @@ def table_of(outcome: 'Outcome') -> 'Table':
         table.add_row(
             f'{row.name} [{row.unit}]'.replace('[', r'\[') + (' (raw)' if row.raw else ''),
             '' if row.paper is None else f'{row.paper:g}',
-            f'{measured.mean:.3g} +- {measured.std:.2g}',
-            f'{measured.median:.3g}',
-            f'{measured.low:.3g} .. {measured.high:.3g}',
+            f'{_figure(measured.mean)} +- {measured.std:.2g}',
+            _figure(measured.median),
+            f'{_figure(measured.low)} .. {_figure(measured.high)}',
             '' if row.bound is None else str(row.bound),
             '' if row.bound is None else 'holds' if row.holds else 'MISSED',
             end_section=last_raw,
         )
     return table
+
+
+def _figure(value: float) -> str:
+    return f'{value:.0f}' if abs(value) >= 1000.0 else f'{value:.3g}'

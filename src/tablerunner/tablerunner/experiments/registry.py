@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from tablerunner.errors import ConfigError
+from tablerunner.experiments.bae2022 import run_bae2022
 from tablerunner.experiments.experiment import Experiment
 from tablerunner.experiments.lv import run_lv
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
     {
         'lv': run_lv,
+        'bae2022': run_bae2022,
     }
 )
 
