@@ -10,7 +10,7 @@ from tablerunner.cli.exits import FAILED
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from tablerunner.experiments.experiment import Outcome
+    from tablerunner.experiments.experiment import Outcome, Row
 
 
 def reproduce(
@@ -24,6 +24,12 @@ def reproduce(
         Path,
         typer.Option('-o', '--output', metavar='DIR', help='Folder of the picture and the JSON.'),
     ] = Path('out/reproduce'),
+    data: Annotated[
+        Path,
+        typer.Option(
+            metavar='DIR', envvar='TABLERUNNER_DATA', help='Folder with recordings of others.'
+        ),
+    ] = Path('../shared/data'),
 ) -> None:
     """Do a published experiment again: the paper's figures beside ours, raw rows first.
 
@@ -36,15 +42,18 @@ def reproduce(
     from tablerunner.cli.bar import Bar
     from tablerunner.cli.json_file import write_json
     from tablerunner.evaluation.plots.sheet import write_sheet
-    from tablerunner.experiments.registry import EXPERIMENTS, experiment_named
+    from tablerunner.experiments.registry import EXPERIMENTS, RECORDED, require_experiment
 
     if not name:
-        for known in EXPERIMENTS:
+        for known in (*EXPERIMENTS, *RECORDED):
             typer.echo(known)
         return
-    run = experiment_named(name)
+    require_experiment(name)
     with Bar(f'reproduce {name}') as bar:
-        outcome = run(range(seeds), bar.show)
+        if name in RECORDED:
+            outcome = RECORDED[name](data, bar.show)
+        else:
+            outcome = EXPERIMENTS[name](range(seeds), bar.show)
     console = Console(highlight=False, width=None if Console().is_terminal else 120)
     console.print(table_of(outcome))
     for note in outcome.notes:
@@ -57,32 +66,43 @@ def reproduce(
 
 
 def table_of(outcome: 'Outcome') -> 'Table':
-    """Return the table of an outcome for a terminal."""
+    """Return the table of an outcome for a terminal; a recording's single run has no spread."""
     from rich import box
     from rich.table import Table
 
+    single = all(row.measured.count == 1 for row in outcome.rows)
+    runs = 'one run' if single else f'{len(outcome.seeds)} seeds from {outcome.seeds[0]}'
     table = Table(
-        title=f'{outcome.title}\n{len(outcome.seeds)} seeds from {outcome.seeds[0]}',
+        title=f'{outcome.title}; {runs}',
         title_justify='left',
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
-    for heading in ('', 'paper', 'mean +- std', 'median', 'min .. max', 'asked', ''):
+    spread = () if single else ('median', 'min .. max')
+    headings = ('', 'paper', 'measured' if single else 'mean +- std', *spread, 'asked', '')
+    for heading in headings:
         table.add_column(heading, justify='right' if heading else 'left', no_wrap=True)
     for index, row in enumerate(outcome.rows):
-        measured = row.measured
+        cells = _cells(row)
+        if single:
+            cells = [*cells[:2], _figure(row.measured.mean), *cells[5:]]
         last_raw = row.raw and not any(later.raw for later in outcome.rows[index + 1 :])
-        table.add_row(
-            f'{row.name} [{row.unit}]'.replace('[', r'\[') + (' (raw)' if row.raw else ''),
-            '' if row.paper is None else f'{row.paper:g}',
-            f'{_figure(measured.mean)} +- {measured.std:.2g}',
-            _figure(measured.median),
-            f'{_figure(measured.low)} .. {_figure(measured.high)}',
-            '' if row.bound is None else str(row.bound),
-            '' if row.bound is None else 'holds' if row.holds else 'MISSED',
-            end_section=last_raw,
-        )
+        table.add_row(*cells, end_section=last_raw)
     return table
+
+
+def _cells(row: 'Row') -> list[str]:
+    measured = row.measured
+    name = f'{row.name} [{row.unit}]'.replace('[', r'\[')
+    return [
+        name + (' (raw)' if row.raw else ''),
+        '' if row.paper is None else f'{row.paper:g}',
+        f'{_figure(measured.mean)} +- {measured.std:.2g}',
+        _figure(measured.median),
+        f'{_figure(measured.low)} .. {_figure(measured.high)}',
+        '' if row.bound is None else str(row.bound),
+        '' if row.bound is None else 'holds' if row.holds else 'MISSED',
+    ]
 
 
 def _figure(value: float) -> str:

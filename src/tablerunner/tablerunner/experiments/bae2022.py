@@ -122,8 +122,8 @@ def run_bae2022(seeds: Sequence[int], progress: Progress) -> Outcome:
         (
             (
                 'Ours knows what T_C knows: the mean error of ranges at the four calibration '
-                'points, here for each anchor; and that the tag does not jump (a velocity that walks '
-                f'by {_TRACKER.acceleration:g} m/s/sqrt(s)). It is causal, no smoother.'
+                'points, here for each anchor; and that the tag does not jump (a velocity that '
+                f'walks by {_TRACKER.acceleration:g} m/s/sqrt(s)). It is causal, no smoother.'
             ),
             (
                 'Table 6 is of real hardware; here its layout (tag at 1.0 m, anchors at 0.594 m, '

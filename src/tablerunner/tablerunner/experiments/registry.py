@@ -1,13 +1,15 @@
-"""Every experiment by the name that chooses it."""
+"""Every experiment by the name that chooses it: simulated ones, and those on recordings."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 
 from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
-from tablerunner.experiments.experiment import Experiment
+from tablerunner.experiments.experiment import Experiment, Outcome, Progress
+from tablerunner.experiments.lias import run_lias
 from tablerunner.experiments.lv import run_lv
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
@@ -18,15 +20,18 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
 )
 
 
-def experiment_named(name: str) -> Experiment:
-    """Return an experiment by its name.
+RECORDED: Mapping[str, Callable[[Path, Progress], Outcome]] = MappingProxyType({'lias': run_lias})
+"""Those that need recordings of others, from the folder that they are given."""
+
+
+def require_experiment(name: str) -> None:
+    """Raise unless there is an experiment of that name.
 
     Raises
     ------
     ConfigError
-        There is none of that name.
+        There is none.
     """
-    try:
-        return EXPERIMENTS[name]
-    except KeyError:
-        raise ConfigError('NAME', name, 'one of ' + ', '.join(EXPERIMENTS)) from None
+    names = (*EXPERIMENTS, *RECORDED)
+    if name not in names:
+        raise ConfigError('NAME', name, 'one of ' + ', '.join(names))
