@@ -266,3 +266,48 @@ def test_driver_process_works_and_ends_cleanly(probe: Probe, processes: Processe
     )
     assert process.end() == 0
     assert 'Traceback' not in process.output
+
+
+def test_driver_solver_and_nlos_test_are_changed_at_run_time(driver: Driver) -> None:
+    """Another solver from the next epoch on; a name that is none is refused and told."""
+    good = driver.node.set_parameters(
+        [Parameter('solver', value='linear'), Parameter('nlos_test', value='none')]
+    )
+    assert all(result.successful for result in good)
+    (bad,) = driver.node.set_parameters([Parameter('solver', value='magic')])
+    assert not bad.successful
+    assert 'nonlinear' in bad.reason
+    for index, anchor in enumerate(ANCHORS):
+        driver.send(anchor, 25.0 * index)
+    driver.probe.wait_for(lambda: driver.fixes and len(driver.ranges) == 3, 'a fix')
+    assert driver.ranges[-1].los == UwbRange.LOS_UNKNOWN
+    assert driver.node._positioner.config.solver == 'linear'
+
+
+@pytest.mark.parametrize('name', ['solver', 'nlos_test'])
+def test_driver_unknown_choice_is_refused_at_start(probe: Probe, name: str) -> None:
+    with pytest.raises(ConfigError, match=name):
+        Driver(probe, **{name: 'magic'})
+
+
+def test_driver_health_of_anchors_and_geometry_are_on_diagnostics(probe: Probe) -> None:
+    """Rate, loss, NLOS share and residual of each anchor; a warning that names the worst."""
+    driver = Driver(probe, worst_nlos=0.5)
+    for index in range(40):
+        for place, anchor in enumerate(ANCHORS):
+            lost = anchor == 'A2' and index % 2
+            blocked = {'first_path_power': -100.0} if anchor == 'A1' else {}
+            if not lost:
+                driver.send(
+                    anchor, 100.0 * index + 25.0 * place, sequence=3 * index + place, **blocked
+                )
+    status = probe.wait_diagnostic(
+        'uwb_driver', 'A0 rate [Hz]', lambda text: 9.5 < float(text) < 10.5
+    )
+    values = {item.key: item.value for item in status.values}
+    assert values['A1 NLOS share'] == '1.00'
+    assert float(values['A2 loss']) == pytest.approx(0.5, abs=0.05)
+    assert float(values['A0 loss']) == pytest.approx(0.0, abs=0.05)
+    assert float(values['A0 residual [m]']) == pytest.approx(0.0, abs=0.05)
+    assert 1.0 < float(values['GDOP']) < 4.0
+    assert 'A1: 100% of its ranges NLOS' in status.message

@@ -8,7 +8,14 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.node import Node
 
 from tablerunner.types import RangeSample, Refusal
-from tablerunner.uwb import Positioner, PositionerConfig, Ranger, RangerConfig
+from tablerunner.uwb import (
+    AnchorHealthConfig,
+    AnchorWatch,
+    Positioner,
+    PositionerConfig,
+    Ranger,
+    RangerConfig,
+)
 from tablerunner_interfaces.msg import UwbAnchorArray, UwbExchange, UwbRange
 from tablerunner_ros.clocks import now_ns
 from tablerunner_ros.conversions.anchors import anchors_to_message
@@ -20,6 +27,7 @@ from tablerunner_ros.parameters import declare_config
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.spin import spin_node
 from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
+from uwb_driver.health import describe_anchors
 from uwb_driver.params import UwbDriverConfig
 
 EXCHANGES = 'uwb/exchanges'
@@ -41,6 +49,8 @@ class UwbDriver(Node):
         positioner = declare_config(self, PositionerConfig, on_change=self._configure_positioner)
         self._ranger = Ranger(ranger)
         self._positioner = Positioner(positioner, ranger.anchors)
+        health = declare_config(self, AnchorHealthConfig, on_change=self._configure_health)
+        self._watch = AnchorWatch(health, ranger.anchor_ids)
         self._last: dict[str, RangeSample] = {}
 
         self._range = UwbRange()
@@ -76,12 +86,15 @@ class UwbDriver(Node):
         self._diagnostics.take(EXCHANGES, result.stamp)
         self._diagnostics.take(f'{EXCHANGES}/{result.anchor_id}', result.stamp)
         self._last[result.anchor_id] = result
+        self._watch.add_range(result)
         fix = self._positioner.add(result)
         if isinstance(fix, Refusal):
             self._diagnostics.refuse(fix)
         elif fix is not None:
             self._fixes.publish(pose_to_message(fix, self._map_frame))
             self._diagnostics.take(fix.source, fix.stamp)
+            if self._positioner.last is not None:
+                self._watch.add_fix(self._positioner.last)
 
     def _configure_ranger(self, config: RangerConfig) -> None:
         self._ranger.configure(config)
@@ -89,12 +102,13 @@ class UwbDriver(Node):
     def _configure_positioner(self, config: PositionerConfig) -> None:
         self._positioner.config = config
 
+    def _configure_health(self, config: AnchorHealthConfig) -> None:
+        self._watch.config = config
+
     def _describe(self, report: Report) -> None:
         if not self._ranger.config.anchor_ids:
             report.add(WARN, 'no anchors given: every exchange is refused (anchor_ids)')
-        for anchor_id, sample in self._last.items():
-            report.values[f'{anchor_id} range [m]'] = f'{sample.range_m:.3f}'
-            report.values[f'{anchor_id} NLOS probability'] = f'{sample.nlos_probability:.2f}'
+        describe_anchors(report, self._watch, self._last, self._positioner.last)
 
 
 def main() -> int:

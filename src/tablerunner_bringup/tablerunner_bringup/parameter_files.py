@@ -24,12 +24,18 @@ from sim_bridge.params import BridgeConfig
 from tablerunner.config import Config, Parameter, parameters_of
 from tablerunner.estimation import LocalizerConfig
 from tablerunner.odometry import OdometerConfig
-from tablerunner.uwb import PositionerConfig, RangerConfig
+from tablerunner.uwb import AnchorHealthConfig, PositionerConfig, RangerConfig
 from tablerunner_ros.stamps import StampConfig
 from uwb_driver.params import UwbDriverConfig
 
 CONFIGS: dict[str, tuple[type[Config], ...]] = {
-    'uwb_driver': (UwbDriverConfig, StampConfig, RangerConfig, PositionerConfig),
+    'uwb_driver': (
+        UwbDriverConfig,
+        StampConfig,
+        RangerConfig,
+        PositionerConfig,
+        AnchorHealthConfig,
+    ),
     'odom_node': (OdomNodeConfig, StampConfig, OdometerConfig),
     'fusion_node': (FusionNodeConfig, StampConfig, LocalizerConfig),
     'nav_controller': (NavNodeConfig,),

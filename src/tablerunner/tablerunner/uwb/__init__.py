@@ -1,5 +1,6 @@
 """UWB: from radio timestamps to calibrated ranges and to positions."""
 
+from tablerunner.uwb.anchor_health import AnchorHealth, AnchorHealthConfig, AnchorWatch
 from tablerunner.uwb.epochs import Epochs
 from tablerunner.uwb.fix import FixState, PositionFix
 from tablerunner.uwb.positioner import Positioner, PositionerConfig
@@ -10,6 +11,9 @@ from tablerunner.uwb.solvers.registry import SOLVERS, Solver, solve
 
 __all__ = [
     'SOLVERS',
+    'AnchorHealth',
+    'AnchorHealthConfig',
+    'AnchorWatch',
     'Epochs',
     'FixState',
     'PositionFix',

@@ -10,11 +10,19 @@ from tablerunner.config import Config, parameter
 from tablerunner.errors import GeometryError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Anchor, PoseSample, RangeSample, Refusal, nanoseconds
-from tablerunner.uwb.fix import FixState
+from tablerunner.uwb.epochs import Epochs
+from tablerunner.uwb.fix import FixState, PositionFix
+from tablerunner.uwb.nlos.residual_test import judge_residuals
 from tablerunner.uwb.solvers.linear import MINIMUM_RANGES
-from tablerunner.uwb.solvers.nonlinear import solve_positions
+from tablerunner.uwb.solvers.registry import SOLVERS, solve
 
 SOURCE = 'uwb/pose'
+
+UNKNOWN_STD_M = 0.1
+"""Standard deviation of a range that comes without a variance."""
+
+SIGNIFICANCE = 0.01
+"""Share of epochs with honest noise of which the covariance may be widened for nothing."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +40,17 @@ class PositionerConfig(Config):
         high=5.0,
         dynamic=True,
     )
+    solver: str = parameter(
+        'nonlinear',
+        description='What turns the ranges of an epoch into a position; see docs/solvers',
+        choices=tuple(SOLVERS),
+        dynamic=True,
+    )
+    residual_test: bool = parameter(
+        False,
+        description='Whether each range is judged against the others before solving (5 anchors)',
+        dynamic=True,
+    )
     nlos_std: float = parameter(
         0.5,
         unit='m',
@@ -40,6 +59,28 @@ class PositionerConfig(Config):
         high=20.0,
         dynamic=True,
     )
+
+
+@dataclass(frozen=True)
+class FixDetail:
+    """What went into the last fix.
+
+    Attributes
+    ----------
+    stamp : int
+        [ns].
+    gdop : float
+        Geometric dilution of precision of the anchors that were used.
+    residuals : dict of str to float
+        Range minus distance to the fix, of each anchor that answered [m].
+    used : tuple of str
+        Anchors whose ranges the solver used.
+    """
+
+    stamp: int
+    gdop: float
+    residuals: dict[str, float]
+    used: tuple[str, ...]
 
 
 class Positioner:
@@ -62,6 +103,7 @@ class Positioner:
         self._anchors = self._anchors.reshape(-1, 3)
         self._biases = {anchor.anchor_id: anchor.bias_m for anchor in anchors}
         self._epoch: dict[str, RangeSample] = {}
+        self.last: FixDetail | None = None
 
     def reset(self) -> None:
         """Drop the epoch that is being gathered."""
@@ -92,24 +134,45 @@ class Positioner:
         stamp = epoch[0].stamp + sum(item.stamp - epoch[0].stamp for item in epoch) // len(epoch)
         if len(epoch) < MINIMUM_RANGES:
             return Refusal(stamp, SOURCE, '', 'fewer than three ranges in an epoch')
-        rows = [self._order[item.anchor_id] for item in epoch]
-        ranges = np.array([[item.range_m - self._biases[item.anchor_id] for item in epoch]])
-        std = np.array([[self._std(item) for item in epoch]])
         try:
-            fix = solve_positions(self._anchors[rows], ranges, std, self.config.tag_height)
+            fix = self._position(epoch)
         except GeometryError:
             return Refusal(stamp, SOURCE, '', 'anchors in one line')
         if not fix.solved[0]:
             return Refusal(stamp, SOURCE, '', FixState(int(fix.state[0])).reason)
+        x, y = fix.position[0]
+        self.last = self._detail(stamp, epoch, fix)
         covariance = np.zeros((3, 3))
         covariance[:2, :2] = fix.covariance[0]
-        # More scatter than the ranges' own noise explains is NLOS or bias: own up to it.
-        covariance[:2, :2] *= fix.excess[0]
+        if not fix.consistent(SIGNIFICANCE)[0]:
+            # More scatter than the ranges' own noise explains is NLOS or bias: own up to it.
+            covariance[:2, :2] *= fix.excess[0]
         covariance[2, 2] = np.inf
-        x, y = fix.position[0]
         return PoseSample(stamp, Pose2(float(x), float(y), 0.0), covariance, SOURCE)
 
-    def _std(self, sample: RangeSample) -> float:
-        probability = 0.0 if np.isnan(sample.nlos_probability) else sample.nlos_probability
-        own = sample.variance_m2 if sample.variance_m2 > 0 else 0.1**2
-        return float(np.sqrt(own + (probability * self.config.nlos_std) ** 2))
+    def _position(self, epoch: list[RangeSample]) -> PositionFix:
+        count = len(self._anchors)
+        ranges, std, nlos = np.full((1, count), np.nan), np.ones((1, count)), np.zeros((1, count))
+        for item in epoch:
+            column = self._order[item.anchor_id]
+            ranges[0, column] = item.range_m - self._biases[item.anchor_id]
+            std[0, column] = item.variance_m2**0.5 if item.variance_m2 > 0.0 else UNKNOWN_STD_M
+            nlos[0, column] = item.nlos_probability
+        height = self.config.tag_height
+        if self.config.residual_test:
+            judged = judge_residuals(Epochs.of(self._anchors, ranges, std, height, nlos))
+            nlos = np.fmax(nlos, judged.probability)
+        known = np.where(np.isnan(nlos), 0.0, nlos)
+        std = np.hypot(std, known * self.config.nlos_std)
+        return solve(self.config.solver, self._anchors, ranges, std, height, nlos)
+
+    def _detail(self, stamp: int, epoch: list[RangeSample], fix: PositionFix) -> FixDetail:
+        place = np.array([*fix.position[0], self.config.tag_height])
+        residuals = {
+            item.anchor_id: item.range_m
+            - self._biases[item.anchor_id]
+            - float(np.linalg.norm(place - self._anchors[self._order[item.anchor_id]]))
+            for item in epoch
+        }
+        used = tuple(name for name, column in self._order.items() if fix.used_mask[0, column])
+        return FixDetail(stamp, float(fix.gdop[0]), residuals, used)

@@ -10,6 +10,8 @@ from tablerunner.errors import ConfigError
 from tablerunner.stream import Order, StampOrder
 from tablerunner.types import Anchor, ExchangeSample, LosState, RangeSample, Refusal
 from tablerunner.uwb import ranging
+from tablerunner.uwb.nlos.range_judge import NLOS_TESTS, RangeJudge
+from tablerunner.uwb.nlos.range_variance import variance_threshold
 
 SOURCE = 'uwb/exchanges'
 
@@ -53,6 +55,12 @@ class RangerConfig(Config):
         high=1000.0,
         dynamic=True,
     )
+    nlos_test: str = parameter(
+        'signal_quality',
+        description='What judges each range: signal_quality, range_variance (Liu 12-13) or none',
+        choices=NLOS_TESTS,
+        dynamic=True,
+    )
     nlos_gap_centre: float = parameter(
         8.0,
         unit='dB',
@@ -67,6 +75,29 @@ class RangerConfig(Config):
         description='Width of the change from likely LOS to likely NLOS',
         above=0.0,
         high=20.0,
+        dynamic=True,
+    )
+
+    nlos_window: int = parameter(
+        50,
+        description='Differences of ranges that range_variance looks at, for each anchor',
+        low=2,
+        high=1000,
+        dynamic=True,
+    )
+    nlos_variance_factor: float = parameter(
+        3.0,
+        description='Variance of differences over that of clear ranges from which on it is NLOS',
+        above=0.0,
+        high=1000.0,
+        dynamic=True,
+    )
+    nlos_offset: float = parameter(
+        0.0,
+        unit='m',
+        description='What is taken off a range that is judged NLOS (Sun 37); 0: nothing',
+        low=0.0,
+        high=5.0,
         dynamic=True,
     )
 
@@ -107,8 +138,14 @@ class Ranger:
         self.configure(config)
 
     def configure(self, config: RangerConfig) -> None:
-        """Use other settings from now on."""
+        """Use other settings from now on; the NLOS test begins anew."""
         self.config = config
+        self._judge = RangeJudge(
+            config.nlos_test,
+            (config.nlos_gap_centre, config.nlos_gap_width),
+            variance_threshold(config.range_std, config.nlos_variance_factor),
+            config.nlos_window,
+        )
         count = len(config.anchor_ids)
         biases = config.anchor_biases or (0.0,) * count
         scales = config.anchor_scales or (0.0,) * count
@@ -117,9 +154,10 @@ class Ranger:
         )
 
     def reset(self) -> None:
-        """Forget the sequence numbers, as after a jump back in time."""
+        """Forget the sequence numbers and ranges, as after a jump back in time."""
         self._sequence.clear()
         self._order.clear()
+        self._judge.reset()
 
     def add(self, sample: ExchangeSample) -> RangeSample | Refusal:
         """Return the range of one exchange, or why there is none.
@@ -154,12 +192,14 @@ class Ranger:
             return self._refuse(sample, 'negative range')
         if range_m > self.config.max_range:
             return self._refuse(sample, 'range beyond max_range')
-        probability = ranging.nlos_probability(
-            sample.rx_power_dbm,
-            sample.first_path_power_dbm,
-            self.config.nlos_gap_centre,
-            self.config.nlos_gap_width,
+        probability = self._judge.probability(
+            sample.anchor_id, range_m, sample.rx_power_dbm, sample.first_path_power_dbm
         )
+        state = _los_state(probability)
+        if state is LosState.NLOS:
+            # A blocked range that is shorter than what is taken off stays as it is.
+            corrected = float(ranging.nlos_corrected(range_m, True, self.config.nlos_offset))
+            range_m = corrected if corrected > 0.0 else range_m
         return RangeSample(
             sample.stamp,
             sample.anchor_id,
@@ -170,7 +210,7 @@ class Ranger:
             raw,
             sample.rx_power_dbm,
             sample.first_path_power_dbm,
-            _los_state(probability),
+            state,
             probability,
         )
 

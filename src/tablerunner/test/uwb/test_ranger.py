@@ -103,3 +103,39 @@ def test_config_bad_value_is_named(changes, field):
     """A list of the wrong length, a repeated anchor and a zero deviation are named."""
     with pytest.raises(ConfigError, match=field):
         CONFIG.replace(**changes)
+
+
+def test_nlos_test_none_never_has_a_say():
+    result = Ranger(CONFIG.replace(nlos_test='none')).add(sample(gap=20.0))
+    assert math.isnan(result.nlos_probability)
+    assert result.los is LosState.UNKNOWN
+
+
+def test_nlos_test_range_variance_finds_the_range_that_jumps():
+    """Each anchor has a series of its own; few differences have no say."""
+    ranger = Ranger(CONFIG.replace(nlos_test='range_variance', nlos_window=20))
+    states = {'A0': [], 'A1': []}
+    for k in range(1, 31):
+        jump = 1.5 if k % 3 == 0 else 0.0
+        for name, extra in (('A0', 0.0), ('A1', jump)):
+            result = ranger.add(sample(k * SECOND, k, name, 5.0 + extra))
+            states[name].append(result.los)
+    assert set(states['A0'][10:]) == {LosState.LOS}
+    assert set(states['A1'][10:]) == {LosState.NLOS}
+    assert set(states['A0'][:6]) == {LosState.UNKNOWN}
+
+
+def test_nlos_offset_is_taken_off_blocked_ranges_only():
+    """Sun 37; a range that is shorter than the constant stays as it is."""
+    ranger = Ranger(CONFIG.replace(nlos_offset=0.4))
+    clear = ranger.add(sample(1 * SECOND, 1, gap=3.0))
+    blocked = ranger.add(sample(2 * SECOND, 2, gap=20.0))
+    short = ranger.add(sample(3 * SECOND, 3, gap=20.0, distance=0.3))
+    assert clear.range_m == pytest.approx(5.0, abs=0.01)
+    assert blocked.range_m == pytest.approx(4.6, abs=0.01)
+    assert short.range_m == pytest.approx(0.3, abs=0.01)
+
+
+def test_unknown_nlos_test_is_refused_with_the_names():
+    with pytest.raises(ConfigError, match=r'nlos_test.*signal_quality'):
+        CONFIG.replace(nlos_test='guess')

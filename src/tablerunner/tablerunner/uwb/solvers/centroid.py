@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tablerunner.uwb.epochs import Array, Epochs
 from tablerunner.uwb.fix import FixState, PositionFix
+from tablerunner.uwb.solvers.admit import admit_other_side, at_least_the_bound
 from tablerunner.uwb.solvers.circle_pair import intersect, plane_of, touching
 from tablerunner.uwb.solvers.judge import judge
 from tablerunner.uwb.solvers.linear import MINIMUM_RANGES
@@ -82,6 +83,8 @@ def _solve(
     _, found = choose_triples(triples, usable)
     state[~found] = FixState.IN_LINE
     state[usable.sum(axis=1) < MINIMUM_RANGES] = FixState.TOO_FEW
+    covariance = at_least_the_bound(epochs, place, covariance, used)
+    covariance, state = admit_other_side(epochs, place, covariance, state)
     return judge(epochs, place, covariance, used, state)
 
 

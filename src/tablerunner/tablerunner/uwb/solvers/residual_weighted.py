@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tablerunner.errors import GeometryError
 from tablerunner.uwb.epochs import Array, Epochs, flatness
 from tablerunner.uwb.fix import FixState, PositionFix
+from tablerunner.uwb.solvers.admit import at_least_the_bound
 from tablerunner.uwb.solvers.judge import judge
 from tablerunner.uwb.solvers.linear import LEAST_FLATNESS, MINIMUM_RANGES, linear_place
 from tablerunner.uwb.solvers.sigma_points import propagate
@@ -44,6 +45,7 @@ def solve_residual_weighted(epochs: Epochs) -> PositionFix:
     covariance = propagate(
         lambda moved: _vote(epochs, moved, subsets)[0], ranges, epochs.std, used
     )
+    covariance = at_least_the_bound(epochs, place, covariance, used)
     state = np.where(used.any(axis=1), FixState.SOLVED, FixState.IN_LINE).astype(np.int8)
     state[usable.sum(axis=1) < MINIMUM_RANGES] = FixState.TOO_FEW
     return judge(epochs, place, covariance, used, state)
