@@ -10,6 +10,7 @@ from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
 from tablerunner.experiments.lias import run_lias
+from tablerunner.experiments.liu2023 import run_liu2023
 from tablerunner.experiments.lv import run_lv
 from tablerunner.experiments.sun2019 import run_sun2019
 
@@ -18,6 +19,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'lv': run_lv,
         'bae2022': run_bae2022,
         'sun2019': run_sun2019,
+        'liu2023': run_liu2023,
     }
 )
 
