@@ -12,6 +12,7 @@ from tablerunner.experiments.experiment import Experiment, Outcome, Progress
 from tablerunner.experiments.lias import run_lias
 from tablerunner.experiments.liu2023 import run_liu2023
 from tablerunner.experiments.lv import run_lv
+from tablerunner.experiments.nlos import run_nlos
 from tablerunner.experiments.sun2019 import run_sun2019
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
@@ -20,6 +21,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'bae2022': run_bae2022,
         'sun2019': run_sun2019,
         'liu2023': run_liu2023,
+        'nlos': run_nlos,
     }
 )
 

@@ -79,14 +79,14 @@ class RangerConfig(Config):
     )
 
     nlos_window: int = parameter(
-        50,
+        20,
         description='Differences of ranges that range_variance looks at, for each anchor',
         low=2,
         high=1000,
         dynamic=True,
     )
     nlos_variance_factor: float = parameter(
-        3.0,
+        1.5,
         description='Variance of differences over that of clear ranges from which on it is NLOS',
         above=0.0,
         high=1000.0,
