@@ -163,7 +163,7 @@ def scenario_of(seed: int, situation: str) -> Scenario:
 
 
 def people_of(seed: int, count: int) -> tuple[Person, ...]:
-    """Return people who walk to and fro inside the square or between it and the walls."""
+    """Return people who walk about inside the square or between it and the walls."""
     rng = stream(seed, 'people of sun2019')
     found = []
     for index in range(count):
