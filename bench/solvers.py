@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from result import Result
 from scipy.optimize import least_squares
 
+from tablerunner.cli.bar import Bar
 from tablerunner.uwb import solve, solve_positions
 
 ROUNDS = 3
@@ -100,7 +101,8 @@ def measure() -> Iterator[Result]:
 def _million() -> Iterator[Result]:
     ranges = ranges_of(MANY_EPOCHS)
     begun = time.perf_counter()
-    solve('nonlinear', ANCHORS, ranges, STD, HEIGHT)
+    with Bar('a million epochs') as bar:
+        solve('nonlinear', ANCHORS, ranges, STD, HEIGHT, progress=bar.show)
     took = time.perf_counter() - begun
     tracemalloc.start()
     fix = solve('nonlinear', ANCHORS, ranges, STD, HEIGHT)
