@@ -28,6 +28,8 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'processor': processor.measure,
     'memory': memory.measure,
 }
+WITH_BAR = {'solvers'}
+"""Those that show a bar of their own, with which a spinner would fight for the line."""
 
 
 def main() -> int:
@@ -45,8 +47,12 @@ def main() -> int:
     console = Console(stderr=True)
     results: list[Result] = []
     for name in arguments.only or BENCHES:
-        with console.status(f'measuring {name} ...'):
+        if name in WITH_BAR:
+            console.print(f'measuring {name} ...', highlight=False)
             found = list(BENCHES[name]())
+        else:
+            with console.status(f'measuring {name} ...'):
+                found = list(BENCHES[name]())
         for result in found:
             console.print(f'  {result.name}: {result.ratio:.3g} ({result.what})', highlight=False)
         results += found
