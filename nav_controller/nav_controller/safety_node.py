@@ -148,15 +148,20 @@ class SafetyNode(Node):
         self._show(self._decision, steady)
         return self._decision
 
+    def on_end(self) -> None:
+        """Leave the wheels a zero: a base may have no time limit on commands of its own."""
+        self._publish(Velocity(0.0, 0.0))
+
     def _send(self, decision: SafetyDecision) -> None:
-        if self._config.twist_stamped:
-            message = velocity_to_twist_stamped(
-                decision.velocity, self._clock_at, self._config.base_frame
-            )
-        else:
-            message = velocity_to_twist(decision.velocity)
-        self._velocity.publish(message)
+        self._publish(decision.velocity)
         self._sent_at = steady_ns()
+
+    def _publish(self, velocity: Velocity) -> None:
+        if self._config.twist_stamped:
+            message = velocity_to_twist_stamped(velocity, self._clock_at, self._config.base_frame)
+        else:
+            message = velocity_to_twist(velocity)
+        self._velocity.publish(message)
 
     def _show(self, decision: SafetyDecision, steady: int) -> None:
         shown = (decision.state, decision.reasons)

@@ -288,6 +288,18 @@ def test_process_ends_cleanly(probe: Probe, processes: Processes) -> None:
     assert process.end() == 0
 
 
+def test_process_that_is_ended_while_driving_leaves_a_zero(
+    probe: Probe, processes: Processes, robot: Any
+) -> None:
+    """A base without a time limit of its own would go on at the last speed."""
+    process = processes.node('nav_controller', 'safety_stop')
+    driver = Driver(probe)
+    driver.wait_speed(lambda speed: speed >= 0.299, 'the commanded speed')
+    assert process.end() == 0
+    probe.spin(0.2)
+    assert driver.heard[-1].linear.x == 0.0
+
+
 def test_no_pose_and_no_sensor_is_a_stop_from_the_start(probe: Probe) -> None:
     probe.host(SafetyNode)
     driver = Driver(probe)
