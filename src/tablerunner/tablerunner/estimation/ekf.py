@@ -9,6 +9,7 @@ combination simply keeps its prior covariance.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from tablerunner.types import (
     Matrix,
     PoseSample,
     RangeSample,
+    Vector,
 )
 
 RANGE_SOURCE = 'uwb/ranges'
@@ -50,6 +52,15 @@ def range_variance(config: EstimatorConfig, sample: RangeSample) -> float:
     if probability > 0.0:  # false for NaN
         variance += (probability * config.nlos_std) ** 2
     return variance
+
+
+class ExpectedRange(NamedTuple):
+    """What an anchor should read."""
+
+    range_m: float
+    variance: float  # [m^2], from the state's
+    cross: Vector  # (n,), covariance of state and range
+    slope: Vector  # (n,), d(range)/d(state)
 
 
 class Ekf:
@@ -116,12 +127,10 @@ class Ekf:
     ) -> tuple[Estimate, Innovation]:
         config = self.config
         index, anchor = self._anchors[sample.anchor_id]
-        expected, jacobian = predict_range(estimate.mean, anchor.position, self.lever_arm, index)
-        innovation = sample.range_m - anchor.bias_m - expected
-        projected = estimate.covariance @ jacobian
-        own = float(jacobian @ projected)
+        expected = self._expect(estimate, anchor, index)
+        innovation = sample.range_m - anchor.bias_m - expected.range_m
         noise = range_variance(config, sample)
-        spread = own + noise
+        spread = expected.variance + noise
         nis = innovation * innovation / spread
         accepted = nis <= config.gate
         reason = '' if accepted else 'beyond the gate'
@@ -129,14 +138,12 @@ class Ekf:
         if accepted:
             if nis > config.huber**2:
                 # Huber: beyond the knee the pull stays constant, as if the noise were larger.
-                noise = spread * math.sqrt(nis) / config.huber - own
+                noise = spread * math.sqrt(nis) / config.huber - expected.variance
                 reason = 'weight reduced'
-            gain = projected / (own + noise)
+            gain = expected.cross / (expected.variance + noise)
             mean = estimate.mean + gain * innovation
             mean[HEADING] = wrap(float(mean[HEADING]))
-            keep = self._identity - gain[:, None] * jacobian
-            covariance = keep @ estimate.covariance @ keep.T
-            covariance += (gain * noise)[:, None] * gain
+            covariance = self._corrected(estimate.covariance, gain, noise, expected)
             after = Estimate(sample.stamp, mean, 0.5 * (covariance + covariance.T))
         return after, Innovation(
             sample.stamp,
@@ -149,6 +156,24 @@ class Ekf:
             nis,
             config.gate,
         )
+
+    def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> ExpectedRange:
+        """Return what an anchor should read, linearised at the mean.
+
+        A filter that spreads points instead overrides this and `_corrected`.
+        """
+        expected, jacobian = predict_range(estimate.mean, anchor.position, self.lever_arm, index)
+        projected = estimate.covariance @ jacobian
+        return ExpectedRange(expected, float(jacobian @ projected), projected, jacobian)
+
+    def _corrected(
+        self, covariance: Matrix, gain: Vector, noise: float, expected: ExpectedRange
+    ) -> Matrix:
+        """Return the covariance after a range, in Joseph's form (Sun 32)."""
+        keep = self._identity - gain[:, None] * expected.slope
+        corrected: Matrix = keep @ covariance @ keep.T
+        corrected += (gain * noise)[:, None] * gain
+        return corrected
 
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tablerunner.errors import GeometryError
 from tablerunner.uwb import ranging
+from tablerunner.uwb.clear_line import fit_clear_line
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,8 @@ class RangeCalibration:
     shortest_m, longest_m : float
         True distances between which it holds.
     scale_fitted : bool
+    rejected : float
+        Share of the ranges that were left out for being blocked; 0 where none are.
     """
 
     bias_m: float
@@ -47,6 +50,7 @@ class RangeCalibration:
     shortest_m: float
     longest_m: float
     scale_fitted: bool
+    rejected: float = 0.0
 
     def apply(self, raw: ArrayLike) -> Array:
         """Return calibrated ranges [m] (Sun 36)."""
@@ -66,7 +70,11 @@ class RangeCalibration:
 
 
 def fit_calibration(
-    true: ArrayLike, raw: ArrayLike, least_span: float = 2.0, robust: bool = True
+    true: ArrayLike,
+    raw: ArrayLike,
+    least_span: float = 2.0,
+    robust: bool = True,
+    blocked: bool = False,
 ) -> RangeCalibration:
     """Return the line through raw ranges over true distances, with its uncertainty.
 
@@ -78,12 +86,17 @@ def fit_calibration(
         Span of true distances [m] under which only a bias is fitted: the scale would be noise.
     robust : bool
         Weigh by Huber's function about a scale from the median absolute residual, so that
-        blocked ranges hardly move the line.
+        a few blocked ranges hardly move the line.
+    blocked : bool
+        Whether up to half of the ranges may be blocked: the line of the others is found
+        (`fit_clear_line`). Not for errors that are lopsided even in plain sight: it finds where
+        most of them lie, not their mean.
 
     Raises
     ------
     GeometryError
-        Shapes differ, a true distance is not positive, or fewer than three pairs are left.
+        Shapes differ, a true distance is not positive, fewer than three pairs are left, or those
+        that agree do not settle a line.
     """
     distance, measured = np.asarray(true, dtype=float), np.asarray(raw, dtype=float)
     if distance.shape != measured.shape or distance.ndim != 1:
@@ -99,6 +112,11 @@ def fit_calibration(
     middle = float(distance.mean())
     design = np.column_stack([np.ones(len(distance)), distance - middle])[:, : 1 + fitted]
     error = measured - distance
+    if blocked:
+        line = fit_clear_line(design, error)
+        return _calibration(
+            line.values, line.covariance, line.std_m, distance, fitted, 1.0 - line.share
+        )
     weight = np.ones(len(distance))
     values = np.zeros(design.shape[1])
     for _ in range(_ROUNDS):
@@ -126,17 +144,31 @@ def fit_calibration(
         inner = inverse @ pulled @ inverse * len(distance) / max(len(distance) - 2, 1)
     else:
         inner = np.linalg.inv(design.T @ design) * variance
+    return _calibration(values, inner, float(np.sqrt(variance)), distance, fitted)
+
+
+def _calibration(
+    values: Array,
+    covariance: Array,
+    std: float,
+    distance: Array,
+    fitted: bool,
+    rejected: float = 0.0,
+) -> RangeCalibration:
+    """Return the calibration of a line about the mean distance: the bias is that at zero."""
+    middle = float(distance.mean())
     full = np.zeros((2, 2))
-    full[: len(values), : len(values)] = inner
+    full[: len(values), : len(values)] = covariance
     to_zero = np.array([[1.0, -middle], [0.0, 1.0]]) if fitted else np.eye(2)
     scale = float(values[1]) if fitted else 0.0
     return RangeCalibration(
         float(values[0]) - scale * middle,
         scale,
         to_zero @ full @ to_zero.T,
-        float(np.sqrt(variance)),
+        std,
         len(distance),
         float(distance.min()),
         float(distance.max()),
         fitted,
+        rejected,
     )

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from tablerunner.estimation.models.state import HEADING, RANGE_BIAS
+from tablerunner.estimation.models.state import GYRO_BIAS, HEADING, RANGE_BIAS, SCALE, X, Y
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import Matrix, Vector
@@ -62,6 +62,27 @@ def move(mean: Vector, motion: Motion) -> tuple[Vector, Matrix, Matrix]:
         [[(1.0 + scale) * cos, -half_y], [(1.0 + scale) * sin, half_x], [0.0, 1.0]]
     )
     return moved, coupling, by_input
+
+
+def move_many(means: Matrix, motion: Motion) -> Matrix:
+    """Return many moved states at once, shape (k, n); headings go on beyond pi, not wrapped.
+
+    Parameters
+    ----------
+    means : ndarray, shape (k, n)
+        States as in `models.state`.
+    motion : Motion
+        Odometry over the step, the same for all.
+    """
+    drift_s = 0.0 if motion.distance_m == 0.0 and motion.turn_rad == 0.0 else motion.dt_s
+    turn = motion.turn_rad - means[:, GYRO_BIAS] * drift_s
+    middle = means[:, HEADING] + 0.5 * turn
+    length = (1.0 + means[:, SCALE]) * motion.distance_m
+    moved: Matrix = np.array(means)
+    moved[:, X] += length * np.cos(middle)
+    moved[:, Y] += length * np.sin(middle)
+    moved[:, HEADING] += turn
+    return moved
 
 
 def state_jacobian(coupling: Matrix, size: int) -> Matrix:

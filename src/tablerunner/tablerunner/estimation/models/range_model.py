@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from tablerunner.estimation.models.state import HEADING, RANGE_BIAS, X, Y
-from tablerunner.types import Vector
+from tablerunner.types import Matrix, Vector
 
 Point3 = tuple[float, float, float]
 
@@ -53,3 +53,22 @@ def predict_range(
         jacobian[HEADING] = uy * arm_x - ux * arm_y
     jacobian[RANGE_BIAS + bias_index] = 1.0
     return distance + float(mean[RANGE_BIAS + bias_index]), jacobian
+
+
+def predict_range_many(
+    means: Matrix, anchor: Point3, lever_arm: Point3, bias_index: int
+) -> Vector:
+    """Return the expected range of many states at once [m], shape (k,).
+
+    Parameters
+    ----------
+    means : ndarray, shape (k, n)
+        States as in `models.state`.
+    anchor, lever_arm, bias_index
+        As for `predict_range`.
+    """
+    cos, sin = np.cos(means[:, HEADING]), np.sin(means[:, HEADING])
+    dx = means[:, X] + cos * lever_arm[0] - sin * lever_arm[1] - anchor[0]
+    dy = means[:, Y] + sin * lever_arm[0] + cos * lever_arm[1] - anchor[1]
+    distance = np.sqrt(dx * dx + dy * dy + (lever_arm[2] - anchor[2]) ** 2)
+    return np.asarray(distance + means[:, RANGE_BIAS + bias_index])

@@ -1,0 +1,74 @@
+"""An unscented Kalman filter on the same state and models as the `ekf`.
+
+Where the EKF linearises, this one moves sigma points (filterpy's) through motion and range models
+and takes their mean and covariance. Noise of odometry enters additively, as there; poses are
+linear measurements and corrected as there; so are gate, robust weight and start.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from filterpy.kalman import MerweScaledSigmaPoints
+
+from tablerunner.estimation.ekf import Ekf, ExpectedRange
+from tablerunner.estimation.estimator import EstimatorConfig
+from tablerunner.estimation.models.motion_model import move, move_many
+from tablerunner.estimation.models.range_model import Point3, predict_range_many
+from tablerunner.estimation.models.state import HEADING, SCALE
+from tablerunner.geometry.angles import wrap
+from tablerunner.odometry.motion import Motion
+from tablerunner.types import Anchor, Estimate, Matrix, Vector
+
+
+class Ukf(Ekf):
+    """Unscented Kalman filter on odometry, ranges and poses."""
+
+    name = 'ukf'
+
+    def __init__(
+        self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
+    ) -> None:
+        super().__init__(config, anchors, lever_arm)
+        # Without weight in the middle: all weights are positive, so that no covariance can become
+        # negative; the points lie root(n) standard deviations away.
+        self._points = MerweScaledSigmaPoints(
+            self._size, alpha=1.0, beta=0.0, kappa=0.0, sqrt_method=_root
+        )
+
+    def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
+        """Return the estimate carried to `stamp` by a motion."""
+        moved = move_many(self._spread(estimate), motion)
+        mean = self._points.Wm @ moved
+        offset = moved - mean
+        covariance = (self._points.Wc[:, None] * offset).T @ offset
+        _, _, by_input = move(estimate.mean, motion)
+        covariance[:3, :3] += (by_input * self.config.motion.variances(motion)) @ by_input.T
+        walk = self._walk_per_time * motion.dt_s
+        walk[SCALE] = self.config.scale_walk**2 * abs(motion.distance_m)
+        covariance.flat[:: self._size + 1] += walk
+        mean[HEADING] = wrap(float(mean[HEADING]))
+        return Estimate(stamp, mean, 0.5 * (covariance + covariance.T))
+
+    def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> ExpectedRange:
+        points = self._spread(estimate)
+        ranges = predict_range_many(points, anchor.position, self.lever_arm, index)
+        expected = float(self._points.Wm @ ranges)
+        weighted = self._points.Wc * (ranges - expected)
+        cross = weighted @ (points - estimate.mean)
+        # No slope: `_corrected` needs none.
+        return ExpectedRange(expected, float(weighted @ (ranges - expected)), cross, cross)
+
+    def _corrected(
+        self, covariance: Matrix, gain: Vector, noise: float, expected: ExpectedRange
+    ) -> Matrix:
+        return np.asarray(covariance - (gain * (expected.variance + noise))[:, None] * gain)
+
+    def _spread(self, estimate: Estimate) -> Matrix:
+        """Return the sigma points, shape (2 n + 1, n); headings not wrapped."""
+        return np.asarray(self._points.sigma_points(estimate.mean, estimate.covariance))
+
+
+def _root(covariance: Matrix) -> Matrix:
+    """Return the symmetric square root; states without variance are no trouble to it."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
