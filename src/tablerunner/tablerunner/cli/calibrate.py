@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 LEAST_RANGES = 20
 """An anchor with fewer ranges is not calibrated."""
 
+WORST_NOISE_M = 0.5
+"""No radio's ranges scatter as much: the true places must be wrong."""
+
 calibrate_app = typer.Typer(
     help='Find what sensors read wrong, from a bag in which the truth is known.',
     no_args_is_help=True,
@@ -137,7 +140,8 @@ def fit_all(found: 'Sequence[RangePairs]') -> 'dict[str, RangeCalibration]':
     Raises
     ------
     ConfigError
-        None was, or the ranges of one do not settle a line.
+        None was, the ranges of one do not settle a line, or scatter so much that the true places
+        cannot be right.
     """
     from tablerunner.uwb.range_calibration import fit_calibration
 
@@ -152,6 +156,12 @@ def fit_all(found: 'Sequence[RangePairs]') -> 'dict[str, RangeCalibration]':
             raise ConfigError(
                 f'anchor {name}', f'{len(item.true)} ranges', f'ranges of one line ({error})'
             ) from error
+        if fits[name].residual_std_m > WORST_NOISE_M:
+            raise ConfigError(
+                f'noise of anchor {name}',
+                f'{fits[name].residual_std_m:.2f} m',
+                f'at most {WORST_NOISE_M} m: true places on the same clock, or a tag that stands',
+            )
     if not fits:
         counts = ', '.join(f'{item.anchor.anchor_id}: {len(item.true)}' for item in found)
         raise ConfigError('ranges of each anchor', counts, f'{LEAST_RANGES} or more of one')
@@ -164,15 +174,16 @@ def report(found: 'Sequence[RangePairs]', fits: 'Mapping[str, RangeCalibration]'
         f'{"anchor":<10} {"bias [m]":>18} {"scale":>20} {"noise [m]":>10} {"ranges":>7} '
         f'{"rejected":>8} {"blocked":>8}'
     ]
-    for name, own in zip((item.anchor.anchor_id for item in found), figures(found, fits)):
-        if name in fits:
-            scale = '{scale:+.4f} +- {scale_std:.4f}'.format(**own)
-            lines.append(
-                '{id:<10} {bias_m:+9.3f} +- {bias_std_m:.3f} {0:>20} {noise_m:>10.3f} '
-                '{ranges:>7} {rejected:>8} {blocked:>8}'.format(
-                    scale if fits[name].scale_fitted else 'not fitted', **own
-                )
-            )
+    for own in figures(found, fits):
+        if own['id'] not in fits:
+            continue
+        scale = 'not fitted'
+        if own['scale'] is not None:
+            scale = f'{own["scale"]:+.4f} +- {own["scale_std"]:.4f}'
+        lines.append(
+            f'{own["id"]:<10} {own["bias_m"]:+9.3f} +- {own["bias_std_m"]:.3f} {scale:>20} '
+            f'{own["noise_m"]:>10.3f} {own["ranges"]:>7} {own["rejected"]:>8} {own["blocked"]:>8}'
+        )
     lines.append('blocked: by their signal, rejected: too far off the line; both are left out')
     still = [name for name, fit in fits.items() if not fit.scale_fitted]
     if still:

@@ -72,7 +72,7 @@ def test_still_tag_gives_biases_only(drive, capsys, tmp_path):
     """At a place that is wrong by design: the difference of the distances is the bias."""
     folder, _, _ = drive
     with BagReader(folder) as bag:
-        found = range_pairs(bag, (), (0.0, 0.0, 1.1), at=(7.0, 7.0))
+        found = range_pairs(bag, (), (0.0, 0.0, 1.1), at=(7.0, 7.0, 1.1))
     for item in found:
         assert np.ptp(item.true) == 0.0
         assert not fit_calibration(item.true, item.raw).scale_fitted

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.evaluation.plots import style
+from tablerunner.uwb.clear_line import CUT
 from tablerunner.uwb.range_calibration import RangeCalibration
 
 Array = NDArray[np.float64]
@@ -18,6 +19,8 @@ def draw_calibration(
     figure: Any, fits: Mapping[str, RangeCalibration], pairs: Mapping[str, tuple[Array, Array]]
 ) -> None:
     """Draw errors of ranges over distance with the fitted lines, and what is left.
+
+    Ranges that are too far off their line to count have a colour of their own.
 
     Parameters
     ----------
@@ -32,10 +35,14 @@ def draw_calibration(
     for column, (anchor_id, fit) in enumerate(fits.items()):
         true, raw = pairs[anchor_id]
         above, below = axes[0, column], axes[1, column]
+        left = fit.apply(raw) - true
+        far = np.abs(left) > CUT * fit.residual_std_m
         above.plot(true, raw - true, '.', color=style.FIX, markersize=2)
+        above.plot(true[far], (raw - true)[far], '.', color=style.NLOS, markersize=2)
         ends = np.array([fit.shortest_m, fit.longest_m])
         above.plot(ends, fit.bias_m + fit.scale * ends, color=style.TRUTH, linewidth=1.2)
-        below.plot(true, fit.apply(raw) - true, '.', color=style.ESTIMATE, markersize=2)
+        below.plot(true[~far], left[~far], '.', color=style.ESTIMATE, markersize=2)
+        below.plot(true[far], left[far], '.', color=style.NLOS, markersize=2)
         below.axhline(0.0, color=style.TRUTH, linewidth=0.8)
         above.set_title(anchor_id, loc='left')
         below.set_xlabel('true range [m]')
