@@ -35,7 +35,7 @@ def read_truth(file: Path) -> Truth:
         try:
             # Seconds of today with nine decimals do not fit into a double.
             stamp = int(Decimal(words[0]).scaleb(9))
-            numbers = [float(word) for word in words[1:]]
+            numbers = [float(word) for word in words[1:]] if 0 <= stamp < 2**63 else []
         except (InvalidOperation, ValueError, OverflowError):
             numbers = []
         if len(numbers) not in (2, 3) or not all(math.isfinite(item) for item in numbers):
