@@ -144,7 +144,9 @@ class Ekf:
             mean = estimate.mean + gain * innovation
             mean[HEADING] = wrap(float(mean[HEADING]))
             covariance = self._corrected(estimate.covariance, gain, noise, expected)
-            after = Estimate(sample.stamp, mean, 0.5 * (covariance + covariance.T))
+            covariance = covariance + covariance.T
+            covariance *= 0.5
+            after = Estimate(sample.stamp, mean, covariance)
         return after, Innovation(
             sample.stamp,
             RANGE_SOURCE,
@@ -169,11 +171,14 @@ class Ekf:
     def _corrected(
         self, covariance: Matrix, gain: Vector, noise: float, expected: ExpectedRange
     ) -> Matrix:
-        """Return the covariance after a range, in Joseph's form (Sun 32)."""
-        keep = self._identity - gain[:, None] * expected.slope
-        corrected: Matrix = keep @ covariance @ keep.T
-        corrected += (gain * noise)[:, None] * gain
-        return corrected
+        """Return the covariance after a range, in Joseph's form (Sun 32).
+
+        (I - K H) P (I - K H)' + K R K' with its products of rank one written out: with
+        A = P - K (H P), the rest is A - (A H' - K R) K'.
+        """
+        half = covariance - gain[:, None] * expected.cross
+        half -= (half @ expected.slope - gain * noise)[:, None] * gain
+        return half
 
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.
