@@ -161,7 +161,7 @@ class Positioner:
         height = self.config.tag_height
         if self.config.residual_test:
             judged = judge_residuals(Epochs.of(self._anchors, ranges, std, height, nlos))
-            nlos = np.fmax(nlos, judged.probability)
+            nlos = np.where(np.isfinite(judged.probability), judged.probability, nlos)
         known = np.where(np.isnan(nlos), 0.0, nlos)
         std = np.hypot(std, known * self.config.nlos_std)
         return solve(self.config.solver, self._anchors, ranges, std, height, nlos)
