@@ -78,14 +78,25 @@ def table_of(outcome: 'Outcome') -> 'Table':
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
+    published = any(row.paper is not None for row in outcome.rows)
     spread = () if single else ('median', 'min .. max')
-    headings = ('', 'paper', 'measured' if single else 'mean +- std', *spread, 'asked', '')
-    for heading in headings:
-        table.add_column(heading, justify='right' if heading else 'left', no_wrap=True)
+    headings = (
+        '',
+        *(('paper',) if published else ()),
+        'measured' if single else 'mean +- std',
+        *spread,
+        'asked',
+        '',
+    )
+    for index, heading in enumerate(headings):
+        # Names may take a second line: a figure or a verdict that is cut off says nothing.
+        table.add_column(heading, justify='right' if heading else 'left', no_wrap=index > 0)
     for index, row in enumerate(outcome.rows):
         cells = _cells(row)
         if single:
             cells = [*cells[:2], _figure(row.measured.mean), *cells[5:]]
+        if not published:
+            cells = [cells[0], *cells[2:]]
         last_raw = row.raw and not any(later.raw for later in outcome.rows[index + 1 :])
         table.add_row(*cells, end_section=last_raw)
     return table
