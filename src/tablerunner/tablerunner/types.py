@@ -146,6 +146,7 @@ class PoseSample:
     pose: Pose2
     covariance: Matrix  # (3, 3): x, y, heading
     source: str = ''
+    point: tuple[float, float] = (0.0, 0.0)  # [m] in base_link: what stands there, as a tag
 
 
 UNKNOWN_YAW_VARIANCE = float(np.pi**2 / 3.0)
@@ -218,3 +219,4 @@ class Innovation:
     covariance: Matrix = field(default_factory=lambda: np.empty((0, 0)))  # S
     nis: float = float('nan')
     gate: float = float('nan')
+    considered: bool = True  # false: not compared with the estimate, so it says nothing about it

@@ -13,6 +13,7 @@ class DeadReckoning:
     """Predicts as the EKF does, takes no measurement."""
 
     name = 'dead_reckoning'
+    takes_positions = False
 
     def __init__(
         self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3

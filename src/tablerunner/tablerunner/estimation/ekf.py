@@ -14,8 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tablerunner.errors import CovarianceError
-from tablerunner.estimation.estimator import EstimatorConfig, Measurement, Start
+from tablerunner.estimation.correction import correct, expect
+from tablerunner.estimation.estimator import (
+    RANGE_SOURCE,
+    EstimatorConfig,
+    Measurement,
+    Start,
+)
 from tablerunner.estimation.models.motion_model import move, transport
+from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3, predict_range
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
@@ -35,9 +42,6 @@ from tablerunner.types import (
     RangeSample,
     Vector,
 )
-
-RANGE_SOURCE = 'uwb/ranges'
-
 
 def bias_covariance(config: EstimatorConfig, count: int) -> Matrix:
     """Return the prior covariance of the range biases, shape (count, count)."""
@@ -67,6 +71,7 @@ class Ekf:
     """Extended Kalman filter on odometry, ranges and poses."""
 
     name = 'ekf'
+    takes_positions = False
 
     def __init__(
         self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
@@ -76,7 +81,6 @@ class Ekf:
         self.state_names = state_names(tuple(anchor.anchor_id for anchor in anchors))
         self._anchors = {anchor.anchor_id: (i, anchor) for i, anchor in enumerate(anchors)}
         self._size = RANGE_BIAS + len(anchors)
-        self._identity = np.eye(self._size)
         self._walk_per_time = np.zeros(self._size)
         self._walk_per_time[GYRO_BIAS] = config.gyro_bias_walk**2
         self._walk_per_time[RANGE_BIAS:] = config.range_bias_walk**2
@@ -183,33 +187,26 @@ class Ekf:
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.
         rows = 3 if math.isfinite(sample.covariance[2, 2]) else 2
-        measured = np.array([sample.pose.x, sample.pose.y, sample.pose.heading])[:rows]
-        innovation = measured - estimate.mean[:rows]
+        place, along = predict_position(estimate.mean, sample.point)
+        innovation, slope = np.zeros(rows), np.zeros((rows, self._size))
+        innovation[:2] = sample.pose.x - place[0], sample.pose.y - place[1]
+        slope[:2] = along
         if rows == 3:
-            innovation[2] = wrap(float(innovation[2]))
+            innovation[2] = wrap(sample.pose.heading - float(estimate.mean[HEADING]))
+            slope[2, HEADING] = 1.0
         noise = sample.covariance[:rows, :rows]
-        spread = estimate.covariance[:rows, :rows] + noise
-        nis = float(innovation @ np.linalg.solve(spread, innovation))
-        accepted = nis <= self.config.pose_gate
-        after = estimate
-        if accepted:
-            gain = np.linalg.solve(spread, estimate.covariance[:rows]).T
-            mean = estimate.mean + gain @ innovation
-            mean[HEADING] = wrap(float(mean[HEADING]))
-            keep = self._identity.copy()
-            keep[:, :rows] -= gain
-            covariance = keep @ estimate.covariance @ keep.T + gain @ noise @ gain.T
-            after = Estimate(sample.stamp, mean, 0.5 * (covariance + covariance.T))
-        reason = '' if accepted else 'beyond the gate'
+        seen = expect(estimate.covariance, innovation, slope, noise)
+        accepted = seen.nis <= self.config.pose_gate
+        after = correct(estimate, seen, sample.stamp) if accepted else estimate
         return after, Innovation(
             sample.stamp,
             sample.source,
             '',
             accepted,
-            reason,
+            '' if accepted else 'beyond the gate',
             innovation,
-            spread,
-            nis,
+            seen.spread,
+            seen.nis,
             self.config.pose_gate,
         )
 

@@ -24,6 +24,82 @@ class Start:
     covariance: Matrix | None = None  # (3 + anchors, 3 + anchors), pose then biases
 
 
+RANGE_SOURCE = 'uwb/ranges'
+
+
+@dataclass(frozen=True)
+class SunConfig(Config):
+    """Noise of `kf` and `ekf_cv`, which keep their own instead of the measurements'."""
+
+    process_variance: float = parameter(
+        0.4,
+        description='Q of kf: variance of a displacement over its square (Sun)',
+        low=0.0,
+        high=100.0,
+        dynamic=True,
+    )
+    position_variance: float = parameter(
+        0.35,
+        unit='m^2',
+        description='R of kf: variance of a position (Sun)',
+        above=0.0,
+        high=100.0,
+        dynamic=True,
+    )
+    acceleration_density: float = parameter(
+        0.4,
+        unit='m^2/s^3',
+        description='Q of ekf_cv: density of the white acceleration (Sun)',
+        low=0.0,
+        high=100.0,
+        dynamic=True,
+    )
+    velocity_variance: float = parameter(
+        0.01,
+        unit='m^2/s',
+        description='Variance of the velocity from odometry over one second',
+        above=0.0,
+        high=100.0,
+        dynamic=True,
+    )
+    range_variance: float = parameter(
+        0.35,
+        unit='m^2',
+        description='R of ekf_cv: variance of a range (Sun)',
+        above=0.0,
+        high=100.0,
+        dynamic=True,
+    )
+
+
+@dataclass(frozen=True)
+class DdfConfig(Config):
+    """When `ddf` corrects how much (Liu)."""
+
+    straight_speed: float = parameter(
+        0.15,
+        unit='m/s',
+        description='Faster is straight on',
+        low=0.0,
+        high=10.0,
+        dynamic=True,
+    )
+    straight_turn_rate: float = parameter(
+        0.03,
+        unit='rad/s',
+        description='Turning less is straight on',
+        low=0.0,
+        high=10.0,
+        dynamic=True,
+    )
+    turn_speed: float = parameter(
+        0.1, unit='m/s', description='Slower is a turn', low=0.0, high=10.0, dynamic=True
+    )
+    turn_rate: float = parameter(
+        0.65, unit='rad/s', description='Turning more is a turn', low=0.0, high=10.0, dynamic=True
+    )
+
+
 @dataclass(frozen=True)
 class EstimatorConfig(Config):
     """Noise and gates; each estimator uses what applies to it."""
@@ -116,6 +192,19 @@ class EstimatorConfig(Config):
         high=1e6,
         dynamic=True,
     )
+    sun: SunConfig = parameter(factory=SunConfig, description='Of kf and ekf_cv')
+    ddf: DdfConfig = parameter(factory=DdfConfig, description='Of ddf')
+
+
+def no_use(
+    estimate: Estimate, measurement: Measurement, reason: str
+) -> tuple[Estimate, Innovation]:
+    """Return the estimate as it is, and a refusal for a reason that is no gate's."""
+    source = RANGE_SOURCE if isinstance(measurement, RangeSample) else measurement.source
+    key = measurement.anchor_id if isinstance(measurement, RangeSample) else ''
+    return estimate, Innovation(
+        measurement.stamp, source, key, False, reason, considered=False
+    )
 
 
 class Estimator(Protocol):
@@ -124,6 +213,11 @@ class Estimator(Protocol):
     @property
     def name(self) -> str:
         """Name by which it is chosen."""
+        ...
+
+    @property
+    def takes_positions(self) -> bool:
+        """Whether it needs ranges made into positions first."""
         ...
 
     @property

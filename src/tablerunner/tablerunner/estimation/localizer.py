@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.checks import check_pose, check_range
-from tablerunner.estimation.ekf import RANGE_SOURCE
-from tablerunner.estimation.estimator import Estimator, Start
+from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
 from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.registry import ESTIMATORS
 from tablerunner.estimation.start_finder import StartFinder
@@ -31,6 +30,8 @@ from tablerunner.types import (
     nanoseconds,
     seconds,
 )
+from tablerunner.uwb import Positioner
+from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 ODOMETRY_SOURCE = 'odom'
 INITIAL_POSE_SOURCE = 'initialpose'
@@ -57,12 +58,14 @@ class Localizer:
         self.config = config
         self._anchors: tuple[Anchor, ...] = ()
         self._anchor_ids: frozenset[str] = frozenset()
+        self._positioner = self._new_positioner(())
         self._clear()
         self.set_anchors(anchors)
 
     def _clear(self) -> None:
         self._pending = _initial_pose(self.config)
         self._track = OdometryTrack()
+        self._positioner.reset()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
@@ -87,6 +90,7 @@ class Localizer:
     def configure(self, config: LocalizerConfig) -> None:
         """Use other dynamic settings from now on; the estimate goes on."""
         self.config = config
+        self._positioner.config = config.positioner.replace(tag_height=self._lever_arm[2])
         if self._timeline is not None:
             self._timeline.estimator = self._new_estimator()
 
@@ -94,6 +98,7 @@ class Localizer:
         """Use these anchors; other ones than before begin a new estimate at the same pose."""
         if anchors == self._anchors:
             return
+        self._positioner = self._new_positioner(anchors)
         self._anchors = anchors
         self._anchor_ids = frozenset(anchor.anchor_id for anchor in anchors)
         self._forget_start()
@@ -104,6 +109,10 @@ class Localizer:
     def reset(self) -> None:
         """Forget everything but anchors and settings; begin as at the start."""
         self._clear()
+
+    def _new_positioner(self, anchors: tuple[Anchor, ...]) -> Positioner:
+        config = self.config.positioner.replace(tag_height=self._lever_arm[2])
+        return Positioner(config, anchors)
 
     def _new_estimator(self) -> Estimator:
         factory = ESTIMATORS[self.config.estimator]
@@ -191,6 +200,8 @@ class Localizer:
         if reason:
             return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
         if self._timeline is not None:
+            if self._timeline.estimator.takes_positions:
+                return self._add_fix(sample)
             innovation = self._timeline.add(sample)
             if innovation is None:
                 return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, 'repeated')
@@ -204,8 +215,20 @@ class Localizer:
             return Outcome(self.estimate)
         return Outcome(self._finder.provisional(alignment))
 
+    def _add_fix(self, sample: RangeSample) -> Outcome:
+        """Gather ranges for an estimator that takes positions; take the fix, when there is one."""
+        fix = self._positioner.add(sample)
+        if isinstance(fix, Refusal):
+            return Outcome(None, (), (fix,))
+        return Outcome() if fix is None else self.add_pose(fix)
+
     def add_pose(self, sample: PoseSample) -> Outcome:
-        """Take a pose or a position without heading, as from a camera or a UWB-only fix."""
+        """Take a pose or a position without heading, as from a camera or a UWB-only fix.
+
+        The place of ``uwb/pose`` is the tag's.
+        """
+        if sample.source == UWB_FIX_SOURCE:
+            sample = replace(sample, point=self._lever_arm[:2])
         reason = check_pose(sample) or self._place_fault(sample.stamp)
         if not reason and self._timeline is None:
             reason = 'start not known yet'
@@ -291,7 +314,7 @@ class Localizer:
 
     def _watch(self, innovation: Innovation) -> None:
         """Count refusals at the gate; when most measurements contradict the pose, it is lost."""
-        if self.config.estimator == 'dead_reckoning':
+        if self.config.estimator == 'dead_reckoning' or not innovation.considered:
             return
         if innovation.accepted:
             self._accepted_stamp = max(self._accepted_stamp, innovation.stamp)

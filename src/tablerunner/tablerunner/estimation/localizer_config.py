@@ -9,6 +9,7 @@ from tablerunner.errors import ConfigError
 from tablerunner.estimation.alignment import AlignmentConfig
 from tablerunner.estimation.estimator import EstimatorConfig
 from tablerunner.estimation.registry import ESTIMATORS
+from tablerunner.uwb import PositionerConfig
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,10 @@ class LocalizerConfig(Config):
         dynamic=True,
     )
     filter: EstimatorConfig = parameter(factory=EstimatorConfig, description='Noise and gates')
+    positioner: PositionerConfig = parameter(
+        factory=PositionerConfig,
+        description='How ranges become positions, for kf and ddf; tag_position gives the height',
+    )
     alignment: AlignmentConfig = parameter(
         factory=AlignmentConfig, description='How the start is found'
     )

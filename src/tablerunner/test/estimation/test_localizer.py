@@ -267,7 +267,11 @@ def test_every_estimator_runs_behind_the_same_interface(room, name):
     pose, truth = localizer.estimate.pose, drive.truth[localizer.estimate.stamp]
     assert pose.distance_to(truth) < 0.1
     innovations = [one for outcome in outcomes for one in outcome.innovations]
-    assert len(innovations) == len(drive.ranges)
+    if ESTIMATORS[name].takes_positions:
+        # Four ranges at 25 Hz make one fix; the last may still be gathered.
+        assert len(drive.ranges) // 4 - 1 <= len(innovations) <= len(drive.ranges) // 4
+    else:
+        assert len(innovations) == len(drive.ranges)
     if name == 'dead_reckoning':
         assert not any(one.accepted for one in innovations)
         assert innovations[0].reason == 'dead reckoning takes no measurements'

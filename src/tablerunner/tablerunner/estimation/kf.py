@@ -1,0 +1,89 @@
+"""Sun's Kalman filter for each axis: odometry's displacement and UWB positions (Sun 18-24).
+
+State: x, y, heading. The heading is odometry's and is never corrected; x and y are filtered each
+for itself, so that the covariance of the position stays diagonal.
+
+The paper leaves its noise input coefficients open. They are the distance driven here: an error of
+odometry grows with the way, along it and across it, and a robot that stands gathers none.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tablerunner.estimation.estimator import EstimatorConfig, Measurement, Start, no_use
+from tablerunner.estimation.models.position_model import predict_position
+from tablerunner.estimation.models.range_model import Point3
+from tablerunner.geometry.angles import wrap
+from tablerunner.odometry.motion import Motion
+from tablerunner.types import Anchor, Estimate, Innovation, RangeSample
+
+STATE_NAMES = ('x', 'y', 'heading')
+
+
+class Kf:
+    """Kalman filter on odometry and positions."""
+
+    name = 'kf'
+    takes_positions = True
+    state_names = STATE_NAMES
+
+    def __init__(
+        self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
+    ) -> None:
+        self.config = config
+
+    def start(self, start: Start) -> Estimate:
+        """Return the first estimate: the given pose without its correlations."""
+        return Estimate(
+            start.stamp,
+            np.array(start.pose, dtype=float),
+            np.diag(np.diagonal(start.pose_covariance)),
+        )
+
+    def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
+        """Return the estimate carried to `stamp` by a motion (Sun 20, 23)."""
+        x, y, heading = estimate.mean.tolist()
+        direction = heading + 0.5 * motion.turn_rad
+        moved = np.array(
+            [
+                x + motion.distance_m * math.cos(direction),
+                y + motion.distance_m * math.sin(direction),
+                wrap(heading + motion.turn_rad),
+            ]
+        )
+        _, turned = self.config.motion.variances(motion)
+        grown = self.config.sun.process_variance * motion.distance_m**2
+        return Estimate(stamp, moved, estimate.covariance + np.diag([grown, grown, turned]))
+
+    def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
+        """Return the estimate corrected by a position (Sun 21, 22, 24), and what happened.
+
+        The variance of a position is the filter's own (R of the paper), not the fix's; a heading
+        that a pose may have is left alone.
+        """
+        if isinstance(measurement, RangeSample):
+            return no_use(estimate, measurement, 'kf takes positions only')
+        expected, _ = predict_position(estimate.mean, measurement.point)
+        innovation = np.array([measurement.pose.x, measurement.pose.y]) - expected
+        before = np.diagonal(estimate.covariance)[:2]
+        noise = self.config.sun.position_variance
+        spread = before + noise
+        gain = before / spread
+        mean = estimate.mean.copy()
+        mean[:2] += gain * innovation
+        after = (1.0 - gain) ** 2 * before + gain**2 * noise
+        covariance = np.diag([*after, estimate.covariance[2, 2]])
+        return Estimate(measurement.stamp, mean, covariance), Innovation(
+            measurement.stamp,
+            measurement.source,
+            '',
+            True,
+            '',
+            innovation,
+            np.diag(spread),
+            float(np.sum(innovation**2 / spread)),
+            math.inf,
+        )
