@@ -46,6 +46,14 @@ class SunConfig(Config):
         high=100.0,
         dynamic=True,
     )
+    largest_offset: float = parameter(
+        0.4,
+        unit='m',
+        description='kf: a position farther from where odometry has it is not believed (Sun 2.6)',
+        above=0.0,
+        high=1e6,
+        dynamic=True,
+    )
     acceleration_density: float = parameter(
         0.4,
         unit='m^2/s^3',
@@ -55,7 +63,7 @@ class SunConfig(Config):
         dynamic=True,
     )
     velocity_variance: float = parameter(
-        0.01,
+        0.001,
         unit='m^2/s',
         description='Variance of the velocity from odometry over one second',
         above=0.0,
@@ -106,7 +114,7 @@ class EstimatorConfig(Config):
 
     motion: MotionNoise = parameter(factory=MotionNoise, description='Noise of odometry')
     scale_std: float = parameter(
-        0.01, description='Prior deviation of the wheels scale error', low=0.0, high=0.5
+        0.03, description='Prior deviation of the wheels scale error', low=0.0, high=0.5
     )
     scale_walk: float = parameter(
         1e-4,

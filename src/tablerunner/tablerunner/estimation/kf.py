@@ -62,7 +62,8 @@ class Kf:
         """Return the estimate corrected by a position (Sun 21, 22, 24), and what happened.
 
         The variance of a position is the filter's own (R of the paper), not the fix's; a heading
-        that a pose may have is left alone.
+        that a pose may have is left alone. A position far from where odometry has the robot is
+        not believed: Sun's check that UWB operates properly (section 2.6).
         """
         if isinstance(measurement, RangeSample):
             return no_use(estimate, measurement, 'kf takes positions only')
@@ -71,17 +72,21 @@ class Kf:
         before = np.diagonal(estimate.covariance)[:2]
         noise = self.config.sun.position_variance
         spread = before + noise
-        gain = before / spread
-        mean = estimate.mean.copy()
-        mean[:2] += gain * innovation
-        after = (1.0 - gain) ** 2 * before + gain**2 * noise
-        covariance = np.diag([*after, estimate.covariance[2, 2]])
-        return Estimate(measurement.stamp, mean, covariance), Innovation(
+        accepted = math.hypot(*innovation) <= self.config.sun.largest_offset
+        after = estimate
+        if accepted:
+            gain = before / spread
+            mean = estimate.mean.copy()
+            mean[:2] += gain * innovation
+            left = (1.0 - gain) ** 2 * before + gain**2 * noise
+            covariance = np.diag([*left, estimate.covariance[2, 2]])
+            after = Estimate(measurement.stamp, mean, covariance)
+        return after, Innovation(
             measurement.stamp,
             measurement.source,
             '',
-            True,
-            '',
+            accepted,
+            '' if accepted else 'UWB and odometry disagree',
             innovation,
             np.diag(spread),
             float(np.sum(innovation**2 / spread)),
