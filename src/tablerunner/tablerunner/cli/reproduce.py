@@ -1,7 +1,7 @@
 """`tablerunner reproduce`: a published experiment done again."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
@@ -18,12 +18,21 @@ def reproduce(
         str, typer.Argument(metavar='NAME', help='Which experiment; without it they are listed.')
     ] = '',
     seeds: Annotated[
-        int, typer.Option(metavar='N', min=1, help='How many seeds to run, from 0 on.')
+        int, typer.Option(metavar='N', min=1, help='How many seeds to run.')
     ] = 20,
+    first_seed: Annotated[
+        int, typer.Option('--seed', metavar='N', min=0, help='The first of the seeds.')
+    ] = 0,
     output: Annotated[
         Path,
         typer.Option('-o', '--output', metavar='DIR', help='Folder of the picture and the JSON.'),
     ] = Path('out/reproduce'),
+    json_file: Annotated[
+        Optional[Path],
+        typer.Option(
+            '--json', metavar='FILE', help='Write the figures alone to a file: medians, 5-95 %.'
+        ),
+    ] = None,
     data: Annotated[
         Path,
         typer.Option(
@@ -35,7 +44,7 @@ def reproduce(
 
     Writes NAME.png and NAME.json. Exit code 1 when a figure is out of its bound.
 
-    Example: tablerunner reproduce lv --seeds 20
+    Example: tablerunner reproduce lv --seeds 20 --seed 100
     """
     from rich.console import Console
 
@@ -53,13 +62,15 @@ def reproduce(
         if name in RECORDED:
             outcome = RECORDED[name](data, bar.show)
         else:
-            outcome = EXPERIMENTS[name](range(seeds), bar.show)
+            outcome = EXPERIMENTS[name](range(first_seed, first_seed + seeds), bar.show)
     console = Console(highlight=False, width=None if Console().is_terminal else 120)
     console.print(table_of(outcome))
     for note in outcome.notes:
         console.print(f'- {note}', markup=False)
     write_json(output / f'{name}.json', outcome.as_json())
     write_sheet(outcome.draw, output / f'{name}.png')
+    if json_file is not None:
+        write_json(json_file, outcome.as_figures())
     typer.echo(f'written: {output / name}.png, {output / name}.json')
     if not outcome.holds:
         raise typer.Exit(FAILED)

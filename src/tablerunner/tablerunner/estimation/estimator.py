@@ -114,7 +114,7 @@ class EstimatorConfig(Config):
 
     motion: MotionNoise = parameter(factory=MotionNoise, description='Noise of odometry')
     scale_std: float = parameter(
-        0.03, description='Prior deviation of the wheels scale error', low=0.0, high=0.5
+        0.02, description='Prior deviation of the wheels scale error', low=0.0, high=0.5
     )
     scale_walk: float = parameter(
         1e-4,

@@ -12,6 +12,11 @@ from tablerunner.estimation.registry import ESTIMATORS
 from tablerunner.uwb import PositionerConfig
 
 
+def _patient_positioner() -> PositionerConfig:
+    # Slow modules take half a second for a round of four anchors; a fast round ends by itself.
+    return PositionerConfig(epoch=0.6)
+
+
 @dataclass(frozen=True)
 class LocalizerConfig(Config):
     """Everything that fusion_node and replay let a user set about estimation."""
@@ -73,7 +78,7 @@ class LocalizerConfig(Config):
     )
     filter: EstimatorConfig = parameter(factory=EstimatorConfig, description='Noise and gates')
     positioner: PositionerConfig = parameter(
-        factory=PositionerConfig,
+        factory=_patient_positioner,
         description='How ranges become positions, for kf and ddf; tag_position gives the height',
     )
     alignment: AlignmentConfig = parameter(

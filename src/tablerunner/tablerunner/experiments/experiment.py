@@ -25,6 +25,8 @@ class Spread:
         Mean, standard deviation (with one degree of freedom taken off), median, least, largest.
     count : int
         Number of seeds.
+    p5, p95 : float
+        Below which 5 % and 95 % of the seeds lie.
     """
 
     mean: float
@@ -33,6 +35,8 @@ class Spread:
     low: float
     high: float
     count: int
+    p5: float = float('nan')
+    p95: float = float('nan')
 
     @classmethod
     def of(cls, values: ArrayLike) -> Spread:
@@ -53,6 +57,8 @@ class Spread:
             float(array.min()),
             float(array.max()),
             array.size,
+            float(np.percentile(array, 5.0)),
+            float(np.percentile(array, 95.0)),
         )
 
 
@@ -166,6 +172,26 @@ class Outcome:
             if row.name == name:
                 return row
         raise KeyError(name)
+
+    def as_figures(self) -> dict[str, Any]:
+        """Return the figures alone: of each row the median and where 90 % of the seeds lie."""
+        return {
+            'name': self.name,
+            'seed': self.seeds[0] if self.seeds else None,
+            'runs': len(self.seeds) or 1,
+            'rows': [
+                {
+                    'row': row.name.rpartition(', ')[0] or row.name,
+                    'metric': row.name.rpartition(', ')[2],
+                    'unit': row.unit,
+                    'paper': row.paper,
+                    'measured': row.measured.median,
+                    'low': row.measured.p5,
+                    'high': row.measured.p95,
+                }
+                for row in self.rows
+            ],
+        }
 
     def as_json(self) -> dict[str, Any]:
         """Return everything but the picture as what JSON knows."""
