@@ -84,14 +84,14 @@ class Ddf:
             return no_use(estimate, measurement, 'neither straight on nor in a turn')
         place, slope = predict_position(estimate.mean[:_KEPT], measurement.point)
         innovation = np.array([measurement.pose.x, measurement.pose.y]) - place
-        noise = measurement.covariance[:2, :2]
+        noise = measurement.covariance[:2, :2] + np.eye(2) * self.config.ddf.position_std**2
         if dimension is Dimension.ACROSS:
             heading = float(estimate.mean[2])
             across = np.array([[-math.sin(heading), math.cos(heading)]])
             innovation, slope, noise = across @ innovation, across @ slope, across @ noise @ across.T
         before = _without_motion(estimate)
         seen = expect(before.covariance, innovation, slope, noise)
-        gate = self.config.pose_gate
+        gate = self.config.ddf.gate
         accepted = seen.nis <= gate
         after = estimate
         if accepted:

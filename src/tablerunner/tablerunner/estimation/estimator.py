@@ -106,6 +106,21 @@ class DdfConfig(Config):
     turn_rate: float = parameter(
         0.65, unit='rad/s', description='Turning more is a turn', low=0.0, high=10.0, dynamic=True
     )
+    position_std: float = parameter(
+        0.1,
+        unit='m',
+        description='Added to the deviation of a position, for blocked ranges that went unnoticed',
+        low=0.0,
+        high=10.0,
+        dynamic=True,
+    )
+    gate: float = parameter(
+        6.6,
+        description='Normalised innovation squared beyond which a position is refused',
+        above=0.0,
+        high=1e6,
+        dynamic=True,
+    )
 
 
 @dataclass(frozen=True)

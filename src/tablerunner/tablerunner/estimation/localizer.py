@@ -11,6 +11,7 @@ import numpy as np
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.checks import check_pose, check_range
 from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
+from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.registry import ESTIMATORS
 from tablerunner.estimation.start_finder import StartFinder
@@ -30,7 +31,6 @@ from tablerunner.types import (
     nanoseconds,
     seconds,
 )
-from tablerunner.uwb import Positioner
 from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 ODOMETRY_SOURCE = 'odom'
@@ -58,14 +58,14 @@ class Localizer:
         self.config = config
         self._anchors: tuple[Anchor, ...] = ()
         self._anchor_ids: frozenset[str] = frozenset()
-        self._positioner = self._new_positioner(())
+        self._fixes = FixMaker(config.positioner, (), self._lever_arm)
         self._clear()
         self.set_anchors(anchors)
 
     def _clear(self) -> None:
         self._pending = _initial_pose(self.config)
         self._track = OdometryTrack()
-        self._positioner.reset()
+        self._fixes.reset()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
@@ -90,7 +90,7 @@ class Localizer:
     def configure(self, config: LocalizerConfig) -> None:
         """Use other dynamic settings from now on; the estimate goes on."""
         self.config = config
-        self._positioner.config = config.positioner.replace(tag_height=self._lever_arm[2])
+        self._fixes.configure(config.positioner)
         if self._timeline is not None:
             self._timeline.estimator = self._new_estimator()
 
@@ -98,7 +98,7 @@ class Localizer:
         """Use these anchors; other ones than before begin a new estimate at the same pose."""
         if anchors == self._anchors:
             return
-        self._positioner = self._new_positioner(anchors)
+        self._fixes = FixMaker(self.config.positioner, anchors, self._lever_arm)
         self._anchors = anchors
         self._anchor_ids = frozenset(anchor.anchor_id for anchor in anchors)
         self._forget_start()
@@ -109,10 +109,6 @@ class Localizer:
     def reset(self) -> None:
         """Forget everything but anchors and settings; begin as at the start."""
         self._clear()
-
-    def _new_positioner(self, anchors: tuple[Anchor, ...]) -> Positioner:
-        config = self.config.positioner.replace(tag_height=self._lever_arm[2])
-        return Positioner(config, anchors)
 
     def _new_estimator(self) -> Estimator:
         factory = ESTIMATORS[self.config.estimator]
@@ -217,7 +213,8 @@ class Localizer:
 
     def _add_fix(self, sample: RangeSample) -> Outcome:
         """Gather ranges for an estimator that takes positions; take the fix, when there is one."""
-        fix = self._positioner.add(sample)
+        place = self.map_to_odom
+        fix = None if place is None else self._fixes.add(sample, place, self._track)
         if isinstance(fix, Refusal):
             return Outcome(None, (), (fix,))
         return Outcome() if fix is None else self.add_pose(fix)

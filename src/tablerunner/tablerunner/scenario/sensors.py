@@ -81,6 +81,12 @@ class WheelErrors(Config):
     radius_scale_std: float = parameter(
         0.005, description='spread of the relative error of each wheel radius', low=0.0, high=0.2
     )
+    radius_scale: tuple[float, float] = parameter(
+        (0.0, 0.0),
+        description='relative error of the left and the right wheel radius of this very robot',
+        low=-0.5,
+        high=0.5,
+    )
     track_scale_std: float = parameter(
         0.01, description='spread of the relative error of the track', low=0.0, high=0.2
     )
@@ -217,6 +223,7 @@ class SensorErrors(Config):
             wheels=self.wheels.replace(
                 ticks_per_turn=0,
                 radius_scale_std=0.0,
+                radius_scale=(0.0, 0.0),
                 track_scale_std=0.0,
                 slip_rate=0.0,
                 floor_noise=0.0,

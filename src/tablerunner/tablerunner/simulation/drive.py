@@ -47,8 +47,9 @@ class Drive:
             errors.radius_scale_std,
             errors.track_scale_std,
         ]
-        self.left_radius_m = float(robot.wheel_radius * scale[0])
-        self.right_radius_m = float(robot.wheel_radius * scale[1])
+        left, right = errors.radius_scale
+        self.left_radius_m = float(robot.wheel_radius * (scale[0] + left))
+        self.right_radius_m = float(robot.wheel_radius * (scale[1] + right))
         self.track_m = float(robot.track * scale[2])
         self._timeout_ns = nanoseconds(errors.command_timeout)
         self._command = Velocity()

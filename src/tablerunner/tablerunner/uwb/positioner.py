@@ -109,6 +109,11 @@ class Positioner:
         """Drop the epoch that is being gathered."""
         self._epoch.clear()
 
+    @property
+    def gathered(self) -> int:
+        """How many ranges of an unfinished epoch there are."""
+        return len(self._epoch)
+
     def add(self, sample: RangeSample) -> PoseSample | Refusal | None:
         """Take one range; return the fix of the epoch that it completes, if it does.
 
