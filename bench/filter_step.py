@@ -11,7 +11,7 @@ from result import Result
 
 from tablerunner.estimation import EstimatorConfig, Start
 from tablerunner.estimation.ekf import Ekf
-from tablerunner.estimation.models.motion_model import add_input_noise, move
+from tablerunner.estimation.models.motion_model import input_noise, move
 from tablerunner.estimation.models.range_model import predict_range
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
@@ -38,9 +38,15 @@ START = Start(1, np.array([5.0, 6.0, 0.3]), np.eye(3) * 0.01)
 VARIANCE = 0.01
 
 
-def ranges(step: int, count: int) -> list[tuple[int, float]]:
-    """Return which anchors are read after a step, and what they read [m]."""
-    return [((step + k) % 4, 8.0 + 0.1 * k) for k in range(count)]
+SAMPLES = tuple(
+    RangeSample(1, anchor.anchor_id, 'tag', k, 8.0 + 0.1 * k, VARIANCE)
+    for k, anchor in enumerate(ANCHORS)
+)
+
+
+def readings(step: int, count: int) -> list[int]:
+    """Return which anchors are read after a step."""
+    return [(step + k) % len(ANCHORS) for k in range(count)]
 
 
 def ours(count: int) -> Estimate:
@@ -49,9 +55,8 @@ def ours(count: int) -> Estimate:
     estimate = ekf.start(START)
     for k in range(STEPS):
         estimate = ekf.predict(estimate, MOTION, k + 2)
-        for index, measured in ranges(k, count):
-            sample = RangeSample(k + 2, f'A{index}', 'tag', k, measured, VARIANCE)
-            estimate, _ = ekf.update(estimate, sample)
+        for index in readings(k, count):
+            estimate, _ = ekf.update(estimate, SAMPLES[index])
     return estimate
 
 
@@ -77,16 +82,16 @@ def filterpy(count: int) -> ExtendedKalmanFilter:
     for k in range(STEPS):
         moved, ekf.F, by_input = move(ekf.x, MOTION)
         ekf.Q = np.diag(walk)
-        add_input_noise(ekf.Q, by_input, *variances)
+        input_noise(ekf.Q, by_input, *variances)
         ekf.predict()
         twist = (
             (1.0 + ekf.x[SCALE]) * MOTION.distance_m / MOTION.dt_s,
             (1.0 + ekf.x[TURN_SCALE]) * MOTION.turn_rad / MOTION.dt_s - ekf.x[GYRO_BIAS],
         )
-        for index, measured in ranges(k, count):
+        for index in readings(k, count):
             place = ANCHORS[index].position
             ekf.update(
-                np.array([measured]),
+                np.array([SAMPLES[index].range_m]),
                 lambda x, a=place, i=index, t=twist: predict_range(x, a, LEVER, i, t)[1][None],
                 lambda x, a=place, i=index, t=twist: np.array(
                     [predict_range(x, a, LEVER, i, t)[0]]

@@ -30,7 +30,7 @@ from tablerunner.estimation.estimator import (
     Measurement,
     Start,
 )
-from tablerunner.estimation.models.motion_model import add_input_noise, move
+from tablerunner.estimation.models.motion_model import input_noise, move, transport
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import STANDING, Point3, predict_range
 from tablerunner.estimation.models.state import (
@@ -139,10 +139,7 @@ class Ekf:
         """Return the estimate carried to `stamp` by a motion."""
         moved, by_state, by_input = move(estimate.mean, motion)
         noise = self._noise(estimate, motion, by_input)
-        covariance = by_state.dot(estimate.covariance).dot(by_state.T)
-        covariance += noise
-        covariance = covariance + covariance.T
-        covariance *= 0.5
+        covariance = transport(estimate.covariance, by_state, noise)
         return Estimate(
             stamp, moved, covariance, twist_of(estimate, moved, motion), estimate.memory
         )
@@ -151,11 +148,12 @@ class Ekf:
         """Return the process noise of a step, (n, n)."""
         config, dt_s = self.config, motion.dt_s
         noise: Matrix = self._walk * dt_s
-        if motion.stands:
+        distance, turn = motion.distance_m, motion.turn_rad
+        if distance == 0.0 and turn == 0.0:
             return noise  # wheels that stand are known to stand
-        noise[SCALE, SCALE] = config.scale_walk**2 * abs(motion.distance_m)
-        noise[TURN_SCALE, TURN_SCALE] = config.turn_scale_walk**2 * abs(motion.turn_rad)
-        add_input_noise(noise, by_input, *config.motion.variances(motion))
+        noise[SCALE, SCALE] = config.scale_walk**2 * abs(distance)
+        noise[TURN_SCALE, TURN_SCALE] = config.turn_scale_walk**2 * abs(turn)
+        input_noise(noise, by_input, *config.motion.variances(motion))
         if self._doubts(estimate):
             doubt = config.doubt_std**2 * dt_s
             noise[X, X] += doubt
@@ -205,7 +203,8 @@ class Ekf:
                 reason = 'long for a while'
             weighed_spread = variance + weighed
             mean = estimate.mean + cross * (innovation / weighed_spread)
-            mean[HEADING] = wrap(float(mean[HEADING]))
+            if not -math.pi < mean[HEADING] <= math.pi:
+                mean[HEADING] = wrap(float(mean[HEADING]))
             after = Estimate(
                 sample.stamp,
                 mean,
@@ -248,9 +247,9 @@ class Ekf:
         For the gain c/s of a single number, Joseph's form (Sun 32) is this very matrix; `spread`
         is never smaller than the variance that it takes away by less than the least noise.
         """
-        gained = cross[:, None] * cross
-        gained *= 1.0 / spread
-        return np.asarray(covariance - gained)
+        root = cross * (1.0 / math.sqrt(spread))
+        # As a product of matrices: half the time of an outer product by broadcasting.
+        return np.asarray(covariance - root.reshape(-1, 1).dot(root.reshape(1, -1)))
 
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.
@@ -283,7 +282,7 @@ def twist_of(estimate: Estimate, moved: Vector, motion: Motion) -> tuple[float, 
     """Return forward speed [m/s] and turn rate [rad/s] of a step, scale errors taken off."""
     if motion.dt_s <= 0.0:
         return estimate.twist
-    if motion.stands:
+    if motion.distance_m == 0.0 and motion.turn_rad == 0.0:
         return STANDING
     turn = (1.0 + float(moved[TURN_SCALE])) * motion.turn_rad / motion.dt_s
     return (

@@ -29,11 +29,6 @@ class Motion:
     dt_s: float
     told_variance: float = 0.0
 
-    @property
-    def stands(self) -> bool:
-        """Whether not even an encoder tick was counted, nor a turn."""
-        return self.distance_m == 0.0 and self.turn_rad == 0.0
-
 
 @dataclass(frozen=True)
 class MotionNoise(Config):

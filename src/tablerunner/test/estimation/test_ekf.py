@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation import EstimatorConfig, Start
 from tablerunner.estimation.ekf import Ekf
-from tablerunner.estimation.models.motion_model import add_input_noise, move
+from tablerunner.estimation.models.motion_model import input_noise, move
 from tablerunner.estimation.models.range_model import predict_range
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
@@ -54,7 +54,7 @@ def test_predict_and_update_equal_filterpy(room):
         walk[RANGE_DELAY] = OPEN.range_delay_walk**2 * 0.02
         walk[RANGE_BIAS:] = OPEN.range_bias_walk**2 * 0.02
         noise = np.diag(walk)
-        add_input_noise(noise, by_input, *OPEN.motion.variances(motion))
+        input_noise(noise, by_input, *OPEN.motion.variances(motion))
         reference.F, reference.Q = by_state, noise
         reference.predict_x = lambda u, moved=moved: setattr(reference, 'x', moved)
         reference.predict()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablerunner.estimation.models.motion_model import add_input_noise, move, move_many
+from tablerunner.estimation.models.motion_model import input_noise, move, move_many, transport
 from tablerunner.estimation.models.range_model import predict_range, predict_range_many
 from tablerunner.estimation.models.state import HEADING, RANGE_BIAS, RANGE_DELAY
 from tablerunner.geometry.angles import wrap
@@ -58,17 +58,24 @@ def test_move_jacobian_by_input_equals_finite_differences(mean, motion):
         assert by_input[:, column] == pytest.approx(slope, abs=1e-6)
 
 
-@given(STATES, MOTIONS, st.floats(1e-6, 1.0), st.floats(1e-6, 1.0))
-def test_input_noise_equals_the_full_product(mean, motion, distance, turn):
-    """What is added is G diag(variances) G', and symmetric to the last bit."""
-    gx, gy, ex, ey, turned = by_input = move(mean, motion).by_input
+@given(STATES, MOTIONS, st.integers(0, 1000))
+def test_transport_equals_the_full_product(mean, motion, seed):
+    """F P F' + G diag(variances) G', and symmetric to the last bit."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(len(mean), len(mean)))
+    covariance = root @ root.T
+    covariance = 0.5 * (covariance + covariance.T)
+    distance, turn = rng.uniform(size=2)
+    moved = move(mean, motion)
+    gx, gy, ex, ey, turned = moved.by_input
     slope = np.array([[gx, ex], [gy, ey], [0.0, turned]])
-    noise = np.eye(len(mean))
-    add_input_noise(noise, by_input, distance, turn)
-    full = np.eye(len(mean))
+    full = moved.by_state @ covariance @ moved.by_state.T
     full[:3, :3] += slope @ np.diag([distance, turn]) @ slope.T
-    assert noise == pytest.approx(full, abs=1e-12)
-    assert np.array_equal(noise, noise.T)
+    noise = np.zeros((len(mean), len(mean)))
+    input_noise(noise, moved.by_input, distance, turn)
+    carried = transport(covariance, moved.by_state, noise)
+    assert carried == pytest.approx(full, abs=1e-9)
+    assert np.array_equal(carried, carried.T)
 
 
 @given(STATES, MOTIONS)

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from tablerunner.estimation import EstimatorConfig, Start
 from tablerunner.estimation.ekf import Ekf
-from tablerunner.estimation.models.motion_model import add_input_noise, move, move_many
+from tablerunner.estimation.models.motion_model import input_noise, move, move_many
 from tablerunner.estimation.models.range_model import predict_range, predict_range_many
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
@@ -60,7 +60,7 @@ def test_predict_and_update_equal_filterpy(room):
         walk[RANGE_BIAS:] = OPEN.range_bias_walk**2 * 0.1
         reference.Q = np.diag(walk)
         by_input = move(reference.x, motion).by_input
-        add_input_noise(reference.Q, by_input, *OPEN.motion.variances(motion))
+        input_noise(reference.Q, by_input, *OPEN.motion.variances(motion))
         ours = ukf.predict(ours, motion, 2 * k + 2)
         reference.predict()
         reference.sigmas_f = points.sigma_points(reference.x, reference.P)
