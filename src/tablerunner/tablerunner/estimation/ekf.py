@@ -166,7 +166,7 @@ class Ekf:
 
     def _doubts(self, estimate: Estimate) -> bool:
         """Whether an anchor has read short for so long that the pose must be wrong."""
-        if not estimate.memory or min(estimate.memory) > -self.config.persistence:
+        if not estimate.memory or min(estimate.memory) > -self.config.doubt:
             return False
         variance = estimate.covariance
         return float(variance[X, X] + variance[Y, Y]) < self.config.doubt_limit**2

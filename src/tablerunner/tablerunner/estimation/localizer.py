@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.checks import check_pose, check_range
 from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
+from tablerunner.estimation.evidence import Evidence
 from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.registry import ESTIMATORS
@@ -35,7 +35,6 @@ from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 ODOMETRY_SOURCE = 'odom'
 INITIAL_POSE_SOURCE = 'initialpose'
-_FEWEST_FOR_LOST = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +69,7 @@ class Localizer:
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
         self._lost = False
-        self._recent: deque[tuple[int, bool]] = deque()  # stamp, accepted
-        self._refused = 0  # of those
+        self._evidence = Evidence()
         self._accepted_stamp = 0
         self._forget_start()
 
@@ -263,8 +261,7 @@ class Localizer:
             self._new_estimator(), self._track, start, nanoseconds(self.config.history)
         )
         self._lost = False
-        self._recent.clear()
-        self._refused = 0
+        self._evidence = Evidence()
         self._accepted_stamp = start.stamp
 
     def _place_fault(self, stamp: int) -> str:
@@ -310,18 +307,15 @@ class Localizer:
             self._begin(Start(stamp, estimate.mean[:3], estimate.pose_covariance))
 
     def _watch(self, innovation: Innovation) -> None:
-        """Count refusals at the gate; when most measurements contradict the pose, it is lost."""
+        """Gather what speaks against the pose; when it is too much, the robot is lost."""
         if self.config.estimator == 'dead_reckoning' or not innovation.considered:
             return
         if innovation.accepted:
             self._accepted_stamp = max(self._accepted_stamp, innovation.stamp)
-        recent = self._recent
-        recent.append((innovation.stamp, innovation.accepted))
-        self._refused += not innovation.accepted
-        while recent[-1][0] - recent[0][0] > nanoseconds(self.config.lost_window):
-            self._refused -= not recent.popleft()[1]
-        share = self._refused / len(recent)
-        if len(recent) >= _FEWEST_FOR_LOST and share > self.config.lost_share:
+        self._evidence.add(innovation, nanoseconds(self.config.lost_window))
+        if self._evidence.mean > self.config.lost_nis or self._evidence.refused_for > nanoseconds(
+            self.config.lost_silence
+        ):
             self._timeline = None
             self._lost = True
             self._forget_start()
