@@ -26,6 +26,7 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dtrtri
 
 from tablerunner.errors import CovarianceError
+from tablerunner.estimation.correction import Expected as Linearised
 from tablerunner.estimation.correction import correct, expect
 from tablerunner.estimation.estimator import (
     RANGE_SOURCE,
@@ -52,6 +53,7 @@ from tablerunner.odometry.motion import Motion
 from tablerunner.types import (
     Anchor,
     Estimate,
+    HeadingSample,
     Innovation,
     Matrix,
     PoseSample,
@@ -175,6 +177,8 @@ class Ekf:
         """Return the estimate corrected by a range or a pose, and what happened."""
         if isinstance(measurement, RangeSample):
             return self._update_range(estimate, measurement)
+        if isinstance(measurement, HeadingSample):
+            return self._update_heading(estimate, measurement)
         return self._update_pose(estimate, measurement)
 
     def update_ranges(
@@ -311,6 +315,16 @@ class Ekf:
         cross = estimate.covariance.dot(jacobian)
         return Expected(expected, float(jacobian.dot(cross)), cross)
 
+    def _update_heading(
+        self, estimate: Estimate, sample: HeadingSample
+    ) -> tuple[Estimate, Innovation]:
+        innovation = np.array([wrap(sample.heading_rad - float(estimate.mean[HEADING]))])
+        slope = np.zeros((1, self._size))
+        slope[0, HEADING] = 1.0
+        seen = expect(estimate.covariance, innovation, slope, np.array([[sample.variance]]))
+        gate = self.config.heading_gate
+        return self._taken(estimate, seen, sample.stamp, sample.source, gate)
+
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.
         rows = 3 if math.isfinite(sample.covariance[2, 2]) else 2
@@ -323,18 +337,18 @@ class Ekf:
             slope[2, HEADING] = 1.0
         noise = sample.covariance[:rows, :rows]
         seen = expect(estimate.covariance, innovation, slope, noise)
-        accepted = seen.nis <= self.config.pose_gate
-        after = correct(estimate, seen, sample.stamp) if accepted else estimate
+        gate = self.config.pose_gate
+        return self._taken(estimate, seen, sample.stamp, sample.source, gate)
+
+    @staticmethod
+    def _taken(
+        estimate: Estimate, seen: Linearised, stamp: int, source: str, gate: float
+    ) -> tuple[Estimate, Innovation]:
+        accepted = seen.nis <= gate
+        after = correct(estimate, seen, stamp) if accepted else estimate
+        reason = '' if accepted else 'beyond the gate'
         return after, Innovation(
-            sample.stamp,
-            sample.source,
-            '',
-            accepted,
-            '' if accepted else 'beyond the gate',
-            innovation,
-            seen.spread,
-            seen.nis,
-            self.config.pose_gate,
+            stamp, source, '', accepted, reason, seen.innovation, seen.spread, seen.nis, gate
         )
 
 

@@ -8,9 +8,17 @@ from typing import Protocol
 
 from tablerunner.config import Config, parameter
 from tablerunner.odometry.motion import Motion, MotionNoise
-from tablerunner.types import Estimate, Innovation, Matrix, PoseSample, RangeSample, Vector
+from tablerunner.types import (
+    Estimate,
+    HeadingSample,
+    Innovation,
+    Matrix,
+    PoseSample,
+    RangeSample,
+    Vector,
+)
 
-Measurement = RangeSample | PoseSample
+Measurement = RangeSample | PoseSample | HeadingSample
 """What an estimator can be corrected by."""
 
 
@@ -300,6 +308,13 @@ class EstimatorConfig(Config):
     gate: float = parameter(
         16.0,
         description='Normalised innovation squared beyond which a range is refused',
+        above=0.0,
+        high=1e6,
+        dynamic=True,
+    )
+    heading_gate: float = parameter(
+        6.6,
+        description='The same for a heading, as of a compass',
         above=0.0,
         high=1e6,
         dynamic=True,

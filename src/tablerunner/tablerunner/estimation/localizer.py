@@ -9,6 +9,7 @@ import numpy as np
 
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.checks import check_pose, check_range
+from tablerunner.estimation.compass import Compass
 from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
 from tablerunner.estimation.evidence import Evidence
 from tablerunner.estimation.fix_maker import FixMaker
@@ -24,6 +25,7 @@ from tablerunner.types import (
     Anchor,
     Estimate,
     Innovation,
+    MagneticSample,
     OdometrySample,
     PoseSample,
     RangeSample,
@@ -58,6 +60,7 @@ class Localizer:
         self._anchors: tuple[Anchor, ...] = ()
         self._anchor_ids: frozenset[str] = frozenset()
         self._fixes = FixMaker(config.positioner, (), self._lever_arm)
+        self._compass = Compass(config.compass)
         self._clear()
         self.set_anchors(anchors)
 
@@ -65,6 +68,7 @@ class Localizer:
         self._pending = _initial_pose(self.config)
         self._track = OdometryTrack()
         self._fixes.reset()
+        self._compass.reset()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
@@ -89,6 +93,7 @@ class Localizer:
         """Use other dynamic settings from now on; the estimate goes on."""
         self.config = config
         self._fixes.configure(config.positioner)
+        self._compass.config = config.compass
         if self._timeline is not None:
             self._timeline.estimator = self._new_estimator()
 
@@ -233,6 +238,23 @@ class Localizer:
         if innovation is None:
             return _refused(sample.stamp, sample.source, '', 'repeated')
         self._watch(innovation)
+        return Outcome(self.estimate, (innovation,))
+
+    def add_magnetic(self, sample: MagneticSample) -> Outcome:
+        """Take a magnetic field: a heading, where it is plausible and the start is known."""
+        heading = self._compass.add(sample)
+        if isinstance(heading, Refusal):
+            return Outcome(None, (), (heading,))
+        if heading is None:
+            return Outcome()
+        reason = self._place_fault(sample.stamp)
+        if not reason and self._timeline is None:
+            reason = 'start not known yet'
+        if reason or self._timeline is None:
+            return _refused(sample.stamp, heading.source, '', reason)
+        innovation = self._timeline.add(heading)
+        if innovation is None:
+            return _refused(sample.stamp, heading.source, '', 'repeated')
         return Outcome(self.estimate, (innovation,))
 
     def set_pose(self, sample: PoseSample) -> Outcome:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from tablerunner.config import Config, parameter
 from tablerunner.errors import ConfigError
 from tablerunner.estimation.alignment import AlignmentConfig
+from tablerunner.estimation.compass import CompassConfig
 from tablerunner.estimation.estimator import EstimatorConfig
 from tablerunner.estimation.registry import ESTIMATORS
 from tablerunner.uwb import PositionerConfig
@@ -91,6 +92,9 @@ class LocalizerConfig(Config):
     positioner: PositionerConfig = parameter(
         factory=_patient_positioner,
         description='How ranges become positions, for kf and ddf; tag_position gives the height',
+    )
+    compass: CompassConfig = parameter(
+        factory=CompassConfig, description='The magnetic field as a source of heading'
     )
     alignment: AlignmentConfig = parameter(
         factory=AlignmentConfig, description='How the start is found'
