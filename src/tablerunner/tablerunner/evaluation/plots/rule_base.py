@@ -13,7 +13,9 @@ from tablerunner.evaluation.plots import style
 from tablerunner.types import Matrix, Vector
 
 _POINTS = 121
-_COLOURS = (style.ESTIMATE, style.FIX, style.ANCHOR, style.NLOS, style.HALT, style.SUBDUED)
+_BANDS = 20
+_SKY = '#56B4E9'  # one more of the palette of Okabe and Ito
+_COLOURS = (style.ESTIMATE, style.FIX, style.ANCHOR, style.NLOS, style.HALT, style.SUBDUED, _SKY)
 
 
 def draw_rule_base(
@@ -83,7 +85,7 @@ def draw_memberships(figure: Any, base: RuleBase, values: Mapping[str, float]) -
 def draw_surface(
     axes: Any, base: RuleBase, over: tuple[str, str], values: Mapping[str, float], marked: bool
 ) -> None:
-    """Draw the output over two inputs as colours and contours, the others held at their values."""
+    """Draw the output over two inputs as bands of colour, the others held at their values."""
     across, up = (base.inputs[base.input_names.index(name)] for name in over)
     x = np.linspace(across.low, across.high, _POINTS)
     y = np.linspace(up.low, up.high, _POINTS)
@@ -92,21 +94,14 @@ def draw_surface(
     output = output.reshape(grid_x.shape)
     low, high = base.output.low, base.output.high
     signed = low < 0.0 < high
-    colours = axes.pcolormesh(
-        x,
-        y,
-        output,
-        cmap='PuOr' if signed else 'viridis',
-        vmin=low,
-        vmax=high,
-        shading='gouraud',
-        rasterized=True,
-    )
-    axes.contour(x, y, output, levels=9, colors='#00000055', linewidths=0.6, linestyles='solid')
+    levels = np.linspace(low, high, _BANDS + 1)
+    # Plateaus lie right on the edges of bands: what rounding adds to them would show as specks.
+    even = np.clip(np.round(output, 9), low, high)
+    colours = axes.contourf(x, y, even, levels, cmap='PuOr' if signed else 'viridis')
     if marked:
         place = [min(max(values[item.name], item.low), item.high) for item in (across, up)]
         axes.plot(*place, 'o', ms=7, mfc='none', mec=style.TRUTH, mew=1.6, clip_on=False)
-    axes.figure.colorbar(colours, ax=axes, label=_label(base.output))
+    axes.figure.colorbar(colours, ax=axes, ticks=levels[::5], label=_label(base.output))
     axes.set_xlabel(_label(across))
     axes.set_ylabel(_label(up))
     _note_others(axes, base, over, values)
