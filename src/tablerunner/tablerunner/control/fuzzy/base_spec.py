@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from itertools import pairwise
 
 from tablerunner.config import Config, parameter
 from tablerunner.control.fuzzy.membership import (
+    LARGEST,
+    LEAST_SIDE,
     Gaussian,
     Membership,
     Trapezoid,
@@ -47,17 +48,10 @@ class SetSpec(Config):
         if len(given) != 1:
             names = ', '.join(item.name for item in fields(self))
             raise ConfigError('', ' and '.join(given) or 'nothing', f'exactly one of {names}')
-        name, corners = given[0], getattr(self, given[0])
-        if name == 'gaussian':
-            if corners[1] <= 0.0:
-                raise ConfigError(name, list(corners), 'a standard deviation above 0')
-            return
-        strict = [a < b for a, b in pairwise(corners)]
-        if name == 'trapezoid':
-            strict[1] = corners[1] <= corners[2]
-        if not all(strict):
-            words = 'numbers that go up (at the end of a domain, left_shoulder or right_shoulder)'
-            raise ConfigError(name, list(corners), words)
+        try:
+            _ = self.membership
+        except ValueError as error:
+            raise ConfigError(given[0], list(getattr(self, given[0])), str(error)) from None
 
     def _given(self) -> list[str]:
         return [item.name for item in fields(self) if getattr(self, item.name) is not None]
@@ -80,15 +74,18 @@ class SetSpec(Config):
 class VariableSpec(Config):
     """An input or the output."""
 
-    domain: tuple[float, float] = parameter(description='least and greatest value')
+    domain: tuple[float, float] = parameter(
+        description='least and greatest value', low=-LARGEST, high=LARGEST
+    )
     sets: dict[str, SetSpec] = parameter(description='the words and their sets')
     unit: str = parameter('', description='unit, for people')
     description: str = parameter('', description='what it is, for people')
 
     def check(self) -> None:
         """Refuse a domain that is upside down, and no sets."""
-        if self.domain[0] >= self.domain[1]:
-            raise ConfigError('domain', list(self.domain), 'the smaller value first')
+        if self.domain[1] - self.domain[0] < LEAST_SIDE:
+            words = f'the smaller value first, the other larger by at least {LEAST_SIDE:g}'
+            raise ConfigError('domain', list(self.domain), words)
         if not self.sets:
             raise ConfigError('sets', {}, 'at least one set')
 

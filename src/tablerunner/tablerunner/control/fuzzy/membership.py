@@ -9,6 +9,12 @@ import numpy as np
 
 from tablerunner.types import Vector
 
+LEAST_SIDE = 1e-6
+"""Sides narrower than this are refused: their slope would drown in rounding, or overflow."""
+
+LARGEST = 1e6
+"""Corners beyond this are refused, for the same reason."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
@@ -29,10 +35,12 @@ class Trapezoid:
         ------
         ValueError
         """
-        rises = self.low < self.left or self.left == -math.inf
-        falls = self.right < self.high or self.right == math.inf
+        rises = self.left - self.low >= LEAST_SIDE or self.left == -math.inf
+        falls = self.high - self.right >= LEAST_SIDE or self.right == math.inf
         if not (rises and falls and self.left <= self.right):
-            raise ValueError('the corners of a set must go up, and its sides must not be upright')
+            raise ValueError(f'corners that go up, with sides at least {LEAST_SIDE:g} wide')
+        if any(abs(corner) > LARGEST for corner in self.corners):
+            raise ValueError(f'corners from {-LARGEST:g} to {LARGEST:g}')
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -79,8 +87,9 @@ class Gaussian:
         ------
         ValueError
         """
-        if not (math.isfinite(self.mean) and math.isfinite(self.std) and self.std > 0.0):
-            raise ValueError('a bell needs a finite mean and a standard deviation above 0')
+        if not (abs(self.mean) <= LARGEST and LEAST_SIDE <= self.std <= LARGEST):
+            words = f'mean to {LARGEST:g}, standard deviation from {LEAST_SIDE:g} to {LARGEST:g}'
+            raise ValueError(f'a bell with a {words}')
 
     @property
     def corners(self) -> tuple[float, ...]:

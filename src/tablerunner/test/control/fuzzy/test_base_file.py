@@ -155,14 +155,14 @@ CELL = 'tables[0].cells.middle'
             'slow: {gaussian: [0.0, 0.0]}',
             'slow: {',
             'inputs.speed.sets.slow.gaussian',
-            'a standard deviation above 0',
+            'standard deviation from 1e-06',
         ),
         (
             'middle: {triangle: [1.0, 4.0, 8.0]}',
             'middle: {triangle: [1.0, 4.0, 4.0]}',
             'middle: {',
             'inputs.distance.sets.middle.triangle',
-            'numbers that go up',
+            'corners that go up',
         ),
         (
             'middle: {triangle: [1.0, 4.0, 8.0]}',
@@ -186,6 +186,20 @@ CELL = 'tables[0].cells.middle'
             'the smaller value first',
         ),
         ('triangle: [1.0, 4.0, 8.0]', 'cone: [1.0]', 'middle: {', None, 'a known field'),
+        (
+            'domain: [0.0, 2.0]',
+            'domain: [0.0, 1.0e+300]',
+            'domain: [0.0, 1.0e',
+            'inputs.speed.domain[1]',
+            'at most 1e+06',
+        ),
+        (
+            'middle: {triangle: [1.0, 4.0, 8.0]}',
+            'middle: {triangle: [4.0, 4.0000001, 8.0]}',
+            'middle: {',
+            'inputs.distance.sets.middle.triangle',
+            'sides at least 1e-06 wide',
+        ),
         # Methods.
         (
             'title: how hard to brake',

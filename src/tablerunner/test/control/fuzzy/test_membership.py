@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from tablerunner.control.fuzzy import (
@@ -16,8 +16,10 @@ from tablerunner.control.fuzzy import (
     right_shoulder,
     triangle,
 )
+from tablerunner.control.fuzzy.membership import LARGEST, LEAST_SIDE
 
 NUMBERS = st.floats(-100.0, 100.0)
+SIDES = st.floats(LEAST_SIDE, 50.0)
 
 
 @pytest.mark.parametrize(
@@ -34,26 +36,42 @@ def test_degrees_are_those_of_the_definition(member, points, degrees) -> None:
     np.testing.assert_allclose(member.degrees(np.array(points)), degrees, atol=1e-12)
 
 
-@given(st.lists(NUMBERS, min_size=4, max_size=4, unique=True), NUMBERS)
-def test_degree_of_any_trapezoid_is_interpolated_between_its_corners(corners, value) -> None:
-    low, left, right, high = sorted(corners)
-    expected = np.interp(value, [low, left, right, high], [0.0, 1.0, 1.0, 0.0], 0.0, 0.0)
-    # The sides are lines through 0 at the outer corners: rounding grows with their steepness.
-    steepness = 1.0 / min(left - low, high - right)
-    degree = Trapezoid(low, left, right, high).degrees(np.array([value]))[0]
+@given(NUMBERS, SIDES, st.floats(0.0, 50.0), SIDES, NUMBERS)
+@example(0.0, LEAST_SIDE, 1.0, LEAST_SIDE, 0.0)
+def test_degree_of_any_trapezoid_is_interpolated_between_its_corners(
+    low: float, rise: float, top: float, fall: float, value: float
+) -> None:
+    left = low + rise
+    corners = low, left, left + top, left + top + fall
+    assume(min(corners[1] - corners[0], corners[3] - corners[2]) >= LEAST_SIDE)
+    expected = np.interp(value, corners, [0.0, 1.0, 1.0, 0.0], 0.0, 0.0)
+    degree = Trapezoid(*corners).degrees(np.array([value]))[0]
     assert 0.0 <= degree <= 1.0
-    assert degree == pytest.approx(expected, abs=1e-12 + 1e-13 * steepness)
+    # Slope times value and slope times corner, up to 260, are rounded before they are subtracted.
+    steepest = 1.0 / min(rise, fall)
+    assert degree == pytest.approx(expected, abs=1e-12 + 4 * 260 * 2.3e-16 * steepest)
 
 
 @pytest.mark.parametrize(
-    'corners', [(1.0, 1.0, 1.0, 2.0), (0.0, 1.0, 2.0, 2.0), (0.0, 2.0, 1.0, 3.0), (3, 2, 1, 0)]
+    'corners',
+    [
+        (1.0, 1.0, 1.0, 2.0),
+        (0.0, 1.0, 2.0, 2.0),
+        (0.0, 2.0, 1.0, 3.0),
+        (3.0, 2.0, 1.0, 0.0),
+        (0.0, 5e-324, 1.0, 2.0),  # a slope that overflows: its degree was not a number
+        (0.0, 1.0, 2.0, math.nan),
+        (0.0, 1.0, 2.0, 2.0 * LARGEST),
+    ],
 )
 def test_upright_or_upside_down_sides_are_refused(corners) -> None:
     with pytest.raises(ValueError, match='corners'):
         Trapezoid(*corners)
 
 
-@pytest.mark.parametrize(('mean', 'std'), [(0.0, 0.0), (0.0, -1.0), (math.nan, 1.0)])
+@pytest.mark.parametrize(
+    ('mean', 'std'), [(0.0, 0.0), (0.0, -1.0), (math.nan, 1.0), (0.0, math.inf), (0.0, 5e-324)]
+)
 def test_bell_without_width_is_refused(mean, std) -> None:
     with pytest.raises(ValueError, match='bell'):
         Gaussian(mean, std)
