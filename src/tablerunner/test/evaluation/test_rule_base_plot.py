@@ -82,5 +82,7 @@ def test_base_of_one_input_is_drawn_as_a_line(figure: Any) -> None:
     )
     base = read_base(Document.parse(text), 'not')
     draw_rule_base(figure, base, ('a', 'a'), {'a': 0.3}, True)
+    assert [axes.get_xlabel() for axes in figure.subfigs[0].axes] == ['a', 'c']
+    assert figure.subfigs[0].axes[0].lines[-1].get_xdata()[0] == 0.3
     line = figure.subfigs[1].axes[0].lines[0]
     np.testing.assert_allclose(line.get_ydata(), 1.0 - line.get_xdata(), atol=1e-12)

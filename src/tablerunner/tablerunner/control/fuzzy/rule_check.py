@@ -78,13 +78,13 @@ def check_rules(
         if index not in used:
             words = 'an input that a rule has a condition on'
             raise _error(document, f'inputs.{variable.name}', variable.name, words)
-    first = np.full(shape, -1)  # index of the first rule for each combination
+    said_by = np.full(shape, -1)  # index of a rule for each combination
     seen: dict[tuple[tuple[int, int], ...], Rule] = {}
     for number, rule in enumerate(rules):
         twin = seen.setdefault(rule.when, rule)
-        part = first[_where(rule, len(shape))]
-        others = np.unique(part[part >= 0])
-        clash = next((rules[k] for k in others if rules[k].then != rule.then), None)
+        block = _where(rule, len(shape))
+        others = np.unique(said_by[block])
+        clash = next((rules[k] for k in others if k >= 0 and rules[k].then != rule.then), None)
         said = output.sets[rule.then].name
         if clash is not None:
             words = f'{output.sets[clash.then].name}, as {_named(clash, document)} says'
@@ -92,18 +92,17 @@ def check_rules(
         if twin is not rule:
             words = f'each rule once: {_named(twin, document)} says the same'
             raise _error(document, rule.place, said, words)
-        part[part < 0] = number
-        first[_where(rule, len(shape))] = part
-    _check_gaps(inputs, rules, first, document)
+        said_by[block] = number
+    _check_gaps(inputs, rules, said_by, document)
 
 
 def _check_gaps(
     inputs: Sequence[Variable],
     rules: Sequence[Rule],
-    first: NDArray[np.intp],
+    said_by: NDArray[np.intp],
     document: Document,
 ) -> None:
-    gaps = np.argwhere(first < 0)
+    gaps = np.argwhere(said_by < 0)
     if not len(gaps):
         return
     gap = [int(word) for word in gaps[0]]
