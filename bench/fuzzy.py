@@ -25,6 +25,7 @@ ROUNDS = 5
 STEPS = 2000
 REFERENCE_STEPS = 8
 COMPARED = 40
+ARRAY = 100_000
 POINTS = 101  # of a universe, as in scikit-fuzzy's examples
 FINE_POINTS = 301  # the corners of all sets are among them
 TOLERANCE = 1e-3  # of the output's domain: what a centroid over 301 points is exact to
@@ -112,6 +113,17 @@ def measure() -> Iterator[Result]:
         by_hand_us / step,
         'us',
         'the same; reference: only memberships by scikit-fuzzy, rules in a loop of plain Python',
+    )
+    corner, many = bases[0], rows_of(bases[0], ARRAY)
+    alone_us = best(lambda: [corner.infer_one(*row) for row in many[:STEPS]]) / STEPS * 1e6
+    array_us = best(lambda: corner.infer(many)) / ARRAY * 1e6
+    yield Result(
+        'fuzzy array',
+        array_us,
+        alone_us,
+        alone_us / array_us,
+        'us',
+        f'lv_corner for {ARRAY} inputs at once, each; reference: ours, one at a time',
     )
 
 
