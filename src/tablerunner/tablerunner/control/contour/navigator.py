@@ -1,0 +1,274 @@
+"""To a target through a room that is not known: reactively, and along contours out of traps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from tablerunner.control.contour.config import ContourConfig
+from tablerunner.control.contour.echo_trail import EchoTrail
+from tablerunner.control.contour.round_watch import RoundWatch
+from tablerunner.control.contour.wall_follower import LEFT, RIGHT, WallFollower
+from tablerunner.control.fuzzy.reactive import ReactiveController
+from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.geometry.angles import difference
+from tablerunner.geometry.pose import Pose2
+from tablerunner.types import Velocity
+
+_SEEN_RAD = math.radians(104.0)  # the side sensors look so far back
+_PAST_RAD = math.radians(5.0)  # a wall beside blocks what is so far to its side
+_GAIN_M = 0.1
+_MOVED_M = 0.1
+_APART_M = 3.0  # of way: leaving the same place sooner is the same leaving
+
+
+class Mode(Enum):
+    """What the robot is about."""
+
+    APPROACH = 'approach'
+    CONTOUR = 'contour'
+    ARRIVED = 'arrived'
+    UNREACHABLE = 'unreachable'
+
+
+@dataclass(frozen=True, slots=True)
+class NavigatorStep:
+    """One decision.
+
+    Attributes
+    ----------
+    velocity : Velocity
+        Within the limits of speed and turn rate.
+    mode : Mode
+    side : int
+        1: contour on the left, by sensor 1; -1: on the right, by sensor 5; 0: none.
+    target_distance_m : float
+    is_free : bool
+        Whether nothing was heard in the target direction.
+    reason : str
+        Why the target is unreachable, or contour following began; else empty.
+    """
+
+    velocity: Velocity
+    mode: Mode
+    side: int
+    target_distance_m: float
+    is_free: bool
+    reason: str = ''
+
+
+class ContourNavigator:
+    """Lv's way to a target: reactive, and along the contour of what it meets (Lv 4.C).
+
+    Deterministic; ends for every target, arrived or unreachable.
+
+    Parameters
+    ----------
+    config : ContourConfig
+    reactive : ReactiveController
+        Its limits are kept here too. Accelerations are the caller's to limit.
+    mounts : tuple of Pose2
+        Poses of the five sensors in base_link, in the order of `SENSORS`.
+    """
+
+    def __init__(
+        self, config: ContourConfig, reactive: ReactiveController, mounts: tuple[Pose2, ...]
+    ) -> None:
+        self.config = config
+        self.reactive = reactive
+        self._trail = EchoTrail(mounts, config.memory, config.look)
+        self._wall = WallFollower(config, self._trail)
+        self._round = RoundWatch(config.shortest_round)
+        self._target: tuple[float, float] | None = None
+
+    def go(self, target: tuple[float, float]) -> None:
+        """Take a target, x and y in map [m]; what was learned on the way to the last is forgotten.
+
+        Raises
+        ------
+        ValueError
+            It is not finite.
+        """
+        if not (math.isfinite(target[0]) and math.isfinite(target[1])):
+            raise ValueError('the target must be finite')
+        self._target = target
+        self._mode = Mode.APPROACH
+        self._reason = ''
+        self._leave = self.config.leave
+        self._left: list[tuple[float, Pose2]] = []  # way and place of each leaving
+        self._way_m = 0.0
+        self._last: Pose2 | None = None
+        self._rest: Pose2 | None = None
+        self._still_s = 0.0
+        self._begin_approach()
+
+    def step(self, readings: Readings, pose: Pose2, dt: float) -> NavigatorStep:
+        """Return what to do now; `pose` is base_link in map, `dt` [s] since the last step.
+
+        Raises
+        ------
+        ValueError
+            No target was given, or the pose is not finite.
+        """
+        if self._target is None:
+            raise ValueError('there is no target to go to')
+        if not pose.is_finite:
+            raise ValueError('the pose is not finite')
+        self._trail.hear(readings, pose, dt)
+        self._measure(pose, dt)
+        east, north = self._target[0] - pose.x, self._target[1] - pose.y
+        away, course = math.hypot(east, north), math.atan2(north, east)
+        if self._mode in (Mode.ARRIVED, Mode.UNREACHABLE):
+            return self._stand(away)
+        if away <= self.config.position_tolerance:
+            self._mode = Mode.ARRIVED
+            return self._stand(away)
+        if self._way_m > self.config.longest_way:
+            return self._give_up(away, f'no way found in {self._way_m:.0f} m')
+        if self._still_s > self.config.stuck_after:
+            return self._give_up(away, f'stands still since {self._still_s:.0f} s')
+        if self._mode is Mode.APPROACH:
+            return self._approach(readings, pose, dt, away, course)
+        return self._along(readings, pose, dt, away, course)
+
+    def _approach(
+        self, readings: Readings, pose: Pose2, dt: float, away: float, course: float
+    ) -> NavigatorStep:
+        target = self._target
+        assert target is not None  # noqa: S101
+        config = self.config
+        if away < self._nearest_m - _GAIN_M:
+            self._nearest_m, self._no_gain_s = away, 0.0
+        self._no_gain_s += dt
+        bearing = difference(course, pose.heading)
+        near = min(config.notice, away)
+        blocked = abs(bearing) <= _SEEN_RAD and self._trail.in_strip(
+            pose, course, near, config.half_width
+        )
+        velocity = self.reactive.step(readings, pose, target).velocity
+        if velocity.linear_m_s > 0.0 and not blocked:
+            ahead = min(config.gap, away)
+            blocked = self._trail.in_strip(pose, pose.heading, ahead, config.hull_width)
+        if blocked or self._no_gain_s > config.patience:
+            reason = 'in the way' if blocked else 'no progress'
+            self._begin_contour(readings, pose, away, bearing)
+            return self._contour_step(readings, pose, away, False, reason)
+        return NavigatorStep(velocity, Mode.APPROACH, 0, away, True)
+
+    def _along(
+        self, readings: Readings, pose: Pose2, dt: float, away: float, course: float
+    ) -> NavigatorStep:
+        config = self.config
+        is_free = self._is_free(readings, pose, away, course, config.look)
+        self._free_s = self._free_s + dt if is_free else 0.0
+        lasts = self._free_s > 0.0 and self._free_s >= config.free_time
+        if (lasts and self._may_leave(pose, away)) or self._wall.is_lost:
+            return self._leave_contour(readings, pose, dt, away, course)
+        if away < self._met_m - config.gain and away < self._open_m:
+            # Something else stands in the target direction, but not at once.
+            if self._is_free(readings, pose, away, course, config.gap):
+                self._open_m = away
+        if self._second_round and away < self._open_m + _GAIN_M:
+            if self._is_free(readings, pose, away, course, config.gap):
+                return self._leave_contour(readings, pose, dt, away, course)
+        if self._round.step(pose):
+            if self._second_round or math.isinf(self._open_m):
+                return self._give_up(away, 'went round without a way out')
+            self._second_round = True
+            self._round.restart()
+        return self._contour_step(readings, pose, away, is_free)
+
+    def _leave_contour(
+        self, readings: Readings, pose: Pose2, dt: float, away: float, course: float
+    ) -> NavigatorStep:
+        self._left.append((self._way_m, pose))
+        self._begin_approach()
+        return self._approach(readings, pose, dt, away, course)
+
+    def _contour_step(
+        self, readings: Readings, pose: Pose2, away: float, is_free: bool, reason: str = ''
+    ) -> NavigatorStep:
+        after = self.reactive.config.stale_after
+        velocity = Velocity()
+        if not readings.stale(after):  # blind: stand
+            velocity = self.reactive.limits.clamp(self._wall.step(readings, pose, after))
+        return NavigatorStep(velocity, Mode.CONTOUR, self._wall.side, away, is_free, reason)
+
+    def _is_free(
+        self, readings: Readings, pose: Pose2, away: float, course: float, reach: float
+    ) -> bool:
+        """Return whether nothing is heard towards the target up to `reach` [m].
+
+        Where no sensor looks, and beyond a wall that is followed, it is not free.
+        """
+        config, side = self.config, self._wall.side
+        bearing = difference(course, pose.heading)
+        if abs(bearing) > _SEEN_RAD or readings.stale(self.reactive.config.stale_after):
+            return False
+        # A wall goes on beyond what was heard of it.
+        if self._wall.hears_wall(readings) and side * bearing > _PAST_RAD:
+            return False
+        return not self._trail.in_strip(pose, course, min(reach, away), config.half_width)
+
+    def _may_leave(self, pose: Pose2, away: float) -> bool:
+        """Return whether a place from where the target direction is free is left.
+
+        The improved method leaves anywhere, the older one only nearer the target than the contour
+        was met. A place that was left before has not led there: then the rule of the older method
+        holds from now on, with which the places where contours are met come ever nearer.
+        """
+        if self._leave == 'free':
+            again = any(
+                self._way_m - way > _APART_M and place.distance_to(pose) < self.config.same_place
+                for way, place in self._left
+            )
+            if not again:
+                return True
+            self._leave = 'nearer'
+        return away < self._met_m - self.config.gain
+
+    def _begin_approach(self) -> None:
+        self._mode = Mode.APPROACH
+        self._nearest_m = math.inf
+        self._no_gain_s = 0.0
+
+    def _begin_contour(
+        self, readings: Readings, pose: Pose2, away: float, bearing: float
+    ) -> None:
+        """Take up the contour: to the freer side, or to the target's where both are alike."""
+        self._mode = Mode.CONTOUR
+        self._met_m = away
+        self._free_s = 0.0
+        self._open_m = math.inf
+        self._second_round = False
+        self._round.restart()
+        config = self.reactive.config
+        used = readings.aged(config.closing_speed, config.reach, config.stale_after)
+        left, right = min(used[0], 2.0) + min(used[1], 2.0), min(used[3], 2.0) + min(used[4], 2.0)
+        if abs(bearing) > math.pi / 4.0:  # it is beside the robot already
+            side = LEFT if bearing > 0.0 else RIGHT
+        elif abs(left - right) > 0.3:
+            side = RIGHT if left > right else LEFT
+        else:
+            side = RIGHT if bearing > 0.0 else LEFT
+        sensor = min((1, 2, 3), key=lambda index: used[index])
+        at = pose @ self._trail.mounts[sensor] @ Pose2(used[sensor])
+        self._wall.begin(side, (at.x, at.y))
+
+    def _measure(self, pose: Pose2, dt: float) -> None:
+        """Keep count of the way, and of the time in which the robot did not move."""
+        if self._last is not None:
+            self._way_m += self._last.distance_to(pose)
+        self._last = pose
+        rest = self._rest
+        if rest is None or rest.distance_to(pose) > _MOVED_M:
+            self._rest, self._still_s = pose, 0.0
+        self._still_s += dt
+
+    def _give_up(self, away: float, reason: str) -> NavigatorStep:
+        self._mode, self._reason = Mode.UNREACHABLE, reason
+        return self._stand(away)
+
+    def _stand(self, away: float) -> NavigatorStep:
+        return NavigatorStep(Velocity(), self._mode, 0, away, False, self._reason)
