@@ -83,7 +83,7 @@ def _try(kind: str, seed: int, rng: np.random.Generator) -> TrapRoom | None:
     target = np.array(_CLOSED_TARGET if kind == 'target closed' else TARGET)
     heading = math.atan2(target[1] - start[1], target[0] - start[0])
     toward = heading + float(rng.uniform(-0.45, 0.45))
-    centre = start + float(rng.uniform(0.35, 0.65)) * (target - start)
+    centre = start + float(rng.uniform(0.35, 0.8)) * (target - start)
     boxes: tuple[Box, ...] = ()
     walls: list[Wall] = []
     if kind == 'box':
@@ -123,20 +123,21 @@ def _try(kind: str, seed: int, rng: np.random.Generator) -> TrapRoom | None:
 
 def _shape(kind: str, rng: np.random.Generator) -> tuple[Line, ...]:
     """Return the walls in the trap's frame: x towards the target, its middle at 0, 0 [m]."""
-    width, depth = float(rng.uniform(1.8, 3.0)), float(rng.uniform(1.4, 2.4))
+    width, depth = float(rng.uniform(1.8, 3.4)), float(rng.uniform(1.4, 2.4))
     v, u = width / 2.0, depth / 2.0
     mirror = 1.0 if rng.random() < 0.5 else -1.0
-    cup = ((-u, -v), (u, -v), (u, v), (-u, v))
+    flare_1, flare_2 = depth * np.tan(rng.uniform(-0.1, 0.7, 2))
+    cup = ((-u, -v - flare_1), (u, -v), (u, v), (-u, v + flare_2))
     if kind == 'U':
         return (cup,)
     if kind == 'L':
-        v += 0.4
-        return (((-u, v * mirror), (u, v * mirror), (u, -v * mirror)),)
+        v += 0.5
+        return (((-u, (v + flare_1) * mirror), (u, v * mirror), (u, -v * mirror)),)
     if kind == 'G':  # a lip across the opening, and its end turned in
         v = max(v, 1.25)
         lip = 2.0 * v - _PASSAGE_M - float(rng.uniform(0.0, 0.3))
         inward = float(rng.uniform(0.2, 0.5))
-        line = ((-u, -v), (u, -v), (u, v), (-u, v), (-u, v - lip), (-u + inward, v - lip))
+        line = ((-u, -v - flare_1), (u, -v), (u, v), (-u, v), (-u, v - lip), (-u + inward, v - lip))
         return (tuple((x, y * mirror) for x, y in line),)
     if kind == 'double':
         u, v = min(u, 0.9), min(v, 1.2)

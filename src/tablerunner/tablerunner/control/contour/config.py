@@ -16,7 +16,7 @@ class ContourConfig(Config):
 
     leave: str = parameter(
         'free',
-        description='Leave as soon as the target direction is free, or nearer the target only',
+        description='Leave where the target direction is free, or, as before, nearer than it began',
         choices=LEAVE,
     )
     distance: float = parameter(
@@ -46,7 +46,7 @@ class ContourConfig(Config):
     )
     gap: float = parameter(
         0.68,
-        description='After a round: up to here only, where the round came nearest the target',
+        description='Up to here only where it is nearer than where the contour began',
         unit='m',
         above=0.0,
     )
@@ -64,7 +64,7 @@ class ContourConfig(Config):
     )
     gain: float = parameter(
         0.1,
-        description='The older method leaves nearer the target by this than it began',
+        description='Nearer than where the contour began is: by this',
         unit='m',
         low=0.0,
     )

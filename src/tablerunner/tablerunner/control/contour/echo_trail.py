@@ -80,6 +80,20 @@ class EchoTrail:
                 return True
         return False
 
+    def nearest_beside(self, pose: Pose2, side: int, length: float) -> float:
+        """Return how far to a side of the robot's way ahead the nearest echo lies [m].
+
+        inf: none on that side, to the left for `side` 1, within `length` ahead.
+        """
+        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        nearest = math.inf
+        for echo in self.echoes:
+            dx, dy = echo.x - pose.x, echo.y - pose.y
+            across = side * (dy * cos - dx * sin)
+            if 0.0 < dx * cos + dy * sin < length and 0.0 <= across < nearest:
+                nearest = across
+        return nearest
+
     def last_of(self, sensor: int) -> Echo | None:
         """Return the newest echo of a sensor."""
         return next((echo for echo in reversed(self.echoes) if echo.sensor == sensor), None)

@@ -95,7 +95,7 @@ class ContourNavigator:
         self._target = target
         self._mode = Mode.APPROACH
         self._reason = ''
-        self._leave = self.config.leave
+        self._looks_far = True
         self._left: list[tuple[float, Pose2]] = []  # way and place of each leaving
         self._way_m = 0.0
         self._last: Pose2 | None = None
@@ -162,29 +162,16 @@ class ContourNavigator:
         config = self.config
         is_free = self._is_free(readings, pose, away, course, config.look)
         self._free_s = self._free_s + dt if is_free else 0.0
-        lasts = self._free_s > 0.0 and self._free_s >= config.free_time
-        if (lasts and self._may_leave(pose, away)) or self._wall.is_lost:
-            return self._leave_contour(readings, pose, dt, away, course)
-        if away < self._met_m - config.gain and away < self._open_m:
-            # Something else stands in the target direction, but not at once.
-            if self._is_free(readings, pose, away, course, config.gap):
-                self._open_m = away
-        if self._second_round and away < self._open_m + _GAIN_M:
-            if self._is_free(readings, pose, away, course, config.gap):
-                return self._leave_contour(readings, pose, dt, away, course)
+        nearer = away < self._met_m - config.gain
+        opens = nearer and self._is_free(readings, pose, away, course, config.gap)
+        self._open_s = self._open_s + dt if opens else 0.0
+        if self._may_leave(pose, nearer) or self._wall.is_lost:
+            self._left.append((self._way_m, pose))
+            self._begin_approach()
+            return self._approach(readings, pose, dt, away, course)
         if self._round.step(pose):
-            if self._second_round or math.isinf(self._open_m):
-                return self._give_up(away, 'went round without a way out')
-            self._second_round = True
-            self._round.restart()
+            return self._give_up(away, 'went round without a way out')
         return self._contour_step(readings, pose, away, is_free)
-
-    def _leave_contour(
-        self, readings: Readings, pose: Pose2, dt: float, away: float, course: float
-    ) -> NavigatorStep:
-        self._left.append((self._way_m, pose))
-        self._begin_approach()
-        return self._approach(readings, pose, dt, away, course)
 
     def _contour_step(
         self, readings: Readings, pose: Pose2, away: float, is_free: bool, reason: str = ''
@@ -211,22 +198,26 @@ class ContourNavigator:
             return False
         return not self._trail.in_strip(pose, course, min(reach, away), config.half_width)
 
-    def _may_leave(self, pose: Pose2, away: float) -> bool:
-        """Return whether a place from where the target direction is free is left.
+    def _may_leave(self, pose: Pose2, nearer: bool) -> bool:
+        """Return whether the contour is left here.
 
-        The improved method leaves anywhere, the older one only nearer the target than the contour
-        was met. A place that was left before has not led there: then the rule of the older method
-        holds from now on, with which the places where contours are met come ever nearer.
+        The older method leaves wherever it is nearer the target than where the contour began. The
+        improved one leaves where the target direction is free, and where it is nearer as soon as
+        there is a gap. A place that was left before has not led there: from then on only the
+        second counts, by which the places where contours begin come ever nearer.
         """
-        if self._leave == 'free':
-            again = any(
-                self._way_m - way > _APART_M and place.distance_to(pose) < self.config.same_place
-                for way, place in self._left
-            )
-            if not again:
-                return True
-            self._leave = 'nearer'
-        return away < self._met_m - self.config.gain
+        if self.config.leave == 'nearer':
+            return nearer
+        enough = self.config.free_time
+        if self._open_s > 0.0 and self._open_s >= enough:
+            return True
+        if not (self._looks_far and self._free_s > 0.0 and self._free_s >= enough):
+            return False
+        self._looks_far = not any(
+            self._way_m - way > _APART_M and place.distance_to(pose) < self.config.same_place
+            for way, place in self._left
+        )
+        return self._looks_far
 
     def _begin_approach(self) -> None:
         self._mode = Mode.APPROACH
@@ -239,9 +230,7 @@ class ContourNavigator:
         """Take up the contour: to the freer side, or to the target's where both are alike."""
         self._mode = Mode.CONTOUR
         self._met_m = away
-        self._free_s = 0.0
-        self._open_m = math.inf
-        self._second_round = False
+        self._free_s = self._open_s = 0.0
         self._round.restart()
         config = self.reactive.config
         used = readings.aged(config.closing_speed, config.reach, config.stale_after)

@@ -17,6 +17,8 @@ _LOST_M = 0.4  # the side sensor hears the wall up to so much beyond the set dis
 _FRONT_M = 0.1  # the front sensor needs so much more room than the side sensor
 _SLANT_M = 0.3
 _CLEARED_M = 0.08
+_AHEAD_M = 0.5  # what is to be passed on the other side counts so far ahead
+_BEYOND_M, _BEYOND_GAIN = 0.48, 3.0
 _ACROSS_GAIN = 1.6  # angle towards the wall over distance too far [rad/m]
 _ACROSS_RAD = 0.5
 _TURN_GAIN = 2.5  # turn rate over heading error [1/s]
@@ -73,8 +75,11 @@ class WallFollower:
         if side == RIGHT:
             near, far = far, near
         room = _CLEARED_M if self._turning else 0.0
+        beyond = self._trail.nearest_beside(pose, -side, _AHEAD_M)
         self._turning = (
-            front < config.distance + _FRONT_M + room or min(near, far) < _SLANT_M + room
+            front < config.distance + _FRONT_M + room
+            or min(near, far) < _SLANT_M + room
+            or beyond < config.hull_width
         )
         if self._turning:
             self._note_wall(near, front, far, pose)
@@ -97,6 +102,8 @@ class WallFollower:
             too_far = math.hypot(east, north) - abs(mount.y) - config.distance
             limit = 2.0 * _ACROSS_RAD
         course += side * min(max(_ACROSS_GAIN * too_far, -limit), limit)
+        if beyond < _BEYOND_M:  # towards the wall, from what stands across
+            course += side * min(_BEYOND_GAIN * (_BEYOND_M - beyond), _ACROSS_RAD)
         return self._drive(difference(course, pose.heading), front)
 
     def _note_wall(self, near: float, front: float, far: float, pose: Pose2) -> None:
