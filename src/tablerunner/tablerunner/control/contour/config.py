@@ -23,6 +23,12 @@ class ContourConfig(Config):
         0.35, description='Distance that the side sensor keeps', unit='m', above=0.0
     )
     speed: float = parameter(0.3, description='Speed along a contour', unit='m/s', above=0.0)
+    approach_speed: float = parameter(
+        0.4,
+        description='Largest speed towards the target: between two cones a thing is heard late',
+        unit='m/s',
+        above=0.0,
+    )
     turn_rate: float = parameter(
         1.0, description='Largest turn rate along a contour', unit='rad/s', above=0.0
     )

@@ -70,15 +70,18 @@ class EchoTrail:
                 until = self._now_s + self._memory_s
                 self.echoes.append(Echo(sensor, until, at.x, at.y, pose.heading))
 
-    def in_strip(self, pose: Pose2, course: float, length: float, half_width: float) -> bool:
-        """Return whether an echo lies in the strip from `pose` along `course` (map) [m, rad]."""
+    def in_strip(
+        self, pose: Pose2, course: float, length: float, half_width: float
+    ) -> Echo | None:
+        """Return the nearest echo in the strip from `pose` along `course` (map) [m, rad]."""
         cos, sin = math.cos(course), math.sin(course)
+        nearest, found = length, None
         for echo in self.echoes:
             dx, dy = echo.x - pose.x, echo.y - pose.y
             along = dx * cos + dy * sin
-            if 0.0 < along < length and abs(dy * cos - dx * sin) < half_width:
-                return True
-        return False
+            if 0.0 < along < nearest and abs(dy * cos - dx * sin) < half_width:
+                nearest, found = along, echo
+        return found
 
     def nearest_beside(self, pose: Pose2, side: int, length: float) -> float:
         """Return how far to a side of the robot's way ahead the nearest echo lies [m].

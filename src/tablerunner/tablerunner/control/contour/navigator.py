@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from tablerunner.control.contour.config import ContourConfig
-from tablerunner.control.contour.echo_trail import EchoTrail
+from tablerunner.control.contour.echo_trail import Echo, EchoTrail
 from tablerunner.control.contour.round_watch import RoundWatch
 from tablerunner.control.contour.wall_follower import LEFT, RIGHT, WallFollower
 from tablerunner.control.fuzzy.reactive import ReactiveController
@@ -19,6 +19,8 @@ from tablerunner.types import Velocity
 _SEEN_RAD = math.radians(104.0)  # the side sensors look so far back
 _PAST_RAD = math.radians(5.0)  # a wall beside blocks what is so far to its side
 _GAIN_M = 0.1
+_ASIDE_RAD = math.radians(25.0)  # what is heard by a slanting sensor is aside
+_FAR_M, _ALIKE_M = 2.0, 0.3
 _MOVED_M = 0.1
 _APART_M = 3.0  # of way: leaving the same place sooner is the same leaving
 
@@ -142,18 +144,21 @@ class ContourNavigator:
             self._nearest_m, self._no_gain_s = away, 0.0
         self._no_gain_s += dt
         bearing = difference(course, pose.heading)
-        near = min(config.notice, away)
-        blocked = abs(bearing) <= _SEEN_RAD and self._trail.in_strip(
-            pose, course, near, config.half_width
-        )
+        blocking = None
+        if abs(bearing) <= _SEEN_RAD:
+            near = min(config.notice, away)
+            blocking = self._trail.in_strip(pose, course, near, config.half_width)
         velocity = self.reactive.step(readings, pose, target).velocity
-        if velocity.linear_m_s > 0.0 and not blocked:
+        if velocity.linear_m_s > 0.0 and blocking is None:
             ahead = min(config.gap, away)
-            blocked = self._trail.in_strip(pose, pose.heading, ahead, config.hull_width)
-        if blocked or self._no_gain_s > config.patience:
-            reason = 'in the way' if blocked else 'no progress'
-            self._begin_contour(readings, pose, away, bearing)
+            blocking = self._trail.in_strip(pose, pose.heading, ahead, config.hull_width)
+        if blocking is not None or self._no_gain_s > config.patience:
+            self._begin_contour(readings, pose, away, bearing, blocking)
+            reason = 'no progress' if blocking is None else 'in the way'
             return self._contour_step(readings, pose, away, False, reason)
+        velocity = Velocity(
+            min(velocity.linear_m_s, config.approach_speed), velocity.angular_rad_s
+        )
         return NavigatorStep(velocity, Mode.APPROACH, 0, away, True)
 
     def _along(
@@ -196,7 +201,8 @@ class ContourNavigator:
         # A wall goes on beyond what was heard of it.
         if self._wall.hears_wall(readings) and side * bearing > _PAST_RAD:
             return False
-        return not self._trail.in_strip(pose, course, min(reach, away), config.half_width)
+        length = min(reach, away)
+        return self._trail.in_strip(pose, course, length, config.half_width) is None
 
     def _may_leave(self, pose: Pose2, nearer: bool) -> bool:
         """Return whether the contour is left here.
@@ -225,25 +231,22 @@ class ContourNavigator:
         self._no_gain_s = 0.0
 
     def _begin_contour(
-        self, readings: Readings, pose: Pose2, away: float, bearing: float
+        self, readings: Readings, pose: Pose2, away: float, bearing: float, blocking: Echo | None
     ) -> None:
-        """Take up the contour: to the freer side, or to the target's where both are alike."""
+        """Take up the contour of what is in the way."""
         self._mode = Mode.CONTOUR
         self._met_m = away
         self._free_s = self._open_s = 0.0
         self._round.restart()
         config = self.reactive.config
         used = readings.aged(config.closing_speed, config.reach, config.stale_after)
-        left, right = min(used[0], 2.0) + min(used[1], 2.0), min(used[3], 2.0) + min(used[4], 2.0)
-        if abs(bearing) > math.pi / 4.0:  # it is beside the robot already
-            side = LEFT if bearing > 0.0 else RIGHT
-        elif abs(left - right) > 0.3:
-            side = RIGHT if left > right else LEFT
+        if blocking is None:
+            sensor = min((1, 2, 3), key=lambda index: used[index])
+            at = pose @ self._trail.mounts[sensor] @ Pose2(used[sensor])
+            wall = at.x, at.y
         else:
-            side = RIGHT if bearing > 0.0 else LEFT
-        sensor = min((1, 2, 3), key=lambda index: used[index])
-        at = pose @ self._trail.mounts[sensor] @ Pose2(used[sensor])
-        self._wall.begin(side, (at.x, at.y))
+            wall = blocking.x, blocking.y
+        self._wall.begin(_side_of(wall, pose, used, bearing), wall)
 
     def _measure(self, pose: Pose2, dt: float) -> None:
         """Keep count of the way, and of the time in which the robot did not move."""
@@ -261,3 +264,20 @@ class ContourNavigator:
 
     def _stand(self, away: float) -> NavigatorStep:
         return NavigatorStep(Velocity(), self._mode, 0, away, False, self._reason)
+
+
+def _side_of(
+    wall: tuple[float, float], pose: Pose2, used: list[float], bearing: float
+) -> int:
+    """Return on which side to have a wall: where it is, so that the robot turns away from it.
+
+    If it is right ahead the robot turns to the freer side, or to the target's if both are alike.
+    """
+    course = math.atan2(wall[1] - pose.y, wall[0] - pose.x)
+    aside = difference(course, pose.heading)
+    if abs(aside) > _ASIDE_RAD:
+        return LEFT if aside > 0.0 else RIGHT
+    left, right = (min(a, _FAR_M) + min(b, _FAR_M) for a, b in (used[:2], used[3:]))
+    if abs(left - right) > _ALIKE_M:
+        return RIGHT if left > right else LEFT
+    return RIGHT if bearing > 0.0 else LEFT
