@@ -27,8 +27,9 @@ from tablerunner.simulation.sonar import Sonar
 from tablerunner.simulation.streams import stream
 from tablerunner.types import NANOSECONDS, Velocity, nanoseconds
 
-STEP_S = 0.01
-CONTROL_S = 0.05
+CONTROL_SLOTS = 2
+"""A control step comes after so many sensors have fired: at 16.7 Hz."""
+
 LONGEST_S = 2400.0
 """A drive that has not ended by itself by then is endless."""
 
@@ -102,23 +103,22 @@ def drive_to(
     segments = scenario.obstacle_segments()
     now, way, contours, mode, reason = NANOSECONDS, 0.0, 0, Mode.APPROACH, ''
     track = []
-    per_control = round(CONTROL_S / STEP_S)
-    per_echo = round(errors.ultrasonic.slot / STEP_S)
-    for number in range(round(longest_s / STEP_S)):
-        if number % per_echo == 0:
-            ring.add(sonar.fire(now, base.pose, ()), now)
-        if number % per_control == 0 and number >= len(SENSORS) * per_echo:
+    slot_s = errors.ultrasonic.slot
+    control_s = CONTROL_SLOTS * slot_s
+    for number in range(round(longest_s / slot_s)):
+        ring.add(sonar.fire(now, base.pose, ()), now)
+        if number >= len(SENSORS) and number % CONTROL_SLOTS == 0:
             track.append((base.pose.x, base.pose.y))
-            step = navigator.step(ring.readings(now), base.pose, CONTROL_S)
+            step = navigator.step(ring.readings(now), base.pose, control_s)
             contours += step.mode is Mode.CONTOUR and mode is not Mode.CONTOUR
             mode, reason = step.mode, step.reason
             if mode in (Mode.ARRIVED, Mode.UNREACHABLE):
                 break
-            velocity = limits.approach(velocity, step.velocity, CONTROL_S)
+            velocity = limits.approach(velocity, step.velocity, control_s)
             base.command(now, velocity)
-        now += nanoseconds(STEP_S)
+        now += nanoseconds(slot_s)
         before = base.pose
-        base.step(now, STEP_S)
+        base.step(now, slot_s)
         way += math.hypot(base.pose.x - before.x, base.pose.y - before.y)
     places = np.array(track)
     gap = float(distance_to_segments(places, segments).min()) - robot.footprint_radius

@@ -95,9 +95,15 @@ def _try(kind: str, seed: int, rng: np.random.Generator) -> TrapRoom | None:
             centre = start if kind == 'start closed' else target
         frame = Pose2(float(centre[0]), float(centre[1]), toward)
         lines = [frame.transform(np.array(line)) for line in _shape(kind, rng)]
+        if kind in ('U', 'L') and rng.random() < 0.5:
+            lines.append(_wing(lines[0][1:3]))
         if any(line.min() < 0.0 or line.max() > SIDE_M for line in lines):
             return None
         walls = [_wall(f'trap {i}', line) for i, line in enumerate(lines, 1)]
+    ends = np.array([start, target])
+    things = [thing.outline.segments for thing in (*walls, *boxes)]
+    if things and distance_to_segments(ends, np.concatenate(things)).min() < _ROOM_AT_ENDS_M:
+        return None
     outer = Wall(((0.0, 0.0), (SIDE_M, 0.0), (SIDE_M, SIDE_M), (0.0, SIDE_M)), 'room', True)
     scenario = Scenario(
         name=f'{kind} {seed}',
@@ -105,10 +111,6 @@ def _try(kind: str, seed: int, rng: np.random.Generator) -> TrapRoom | None:
         boxes=boxes,
         start=(float(start[0]), float(start[1]), float(rng.uniform(-math.pi, math.pi))),
     )
-    ends = np.array([start, target])
-    segments = scenario.obstacle_segments()
-    if distance_to_segments(ends, segments).min() < _ROOM_AT_ENDS_M:
-        return None
     goal = float(target[0]), float(target[1])
     shortest = shortest_way(scenario, goal, 0.02)
     if kind in CLOSED:
@@ -170,6 +172,14 @@ def _wall(name: str, line: Array) -> Wall:
     mitre = (before + after) / (1.0 + np.sum(before * after, axis=1))[:, None]
     half = _BOARD_M / 2.0 * mitre
     return Wall(_points(np.concatenate([line + half, (line - half)[::-1]])), name, True)
+
+
+def _wing(base: Array) -> Array:
+    """Return a partition that goes on from the base's end (its second corner) to the room's wall."""
+    end, along = base[1], base[1] - base[0]
+    along = along / np.linalg.norm(along)
+    room = np.where(along > 0.0, SIDE_M - end, end) / np.maximum(np.abs(along), 1e-9)
+    return np.array([end + _BOARD_M * along, end + (room.min() - _BOARD_M) * along])
 
 
 def _points(points: Array) -> Line:

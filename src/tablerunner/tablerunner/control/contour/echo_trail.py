@@ -24,6 +24,9 @@ class Echo(NamedTuple):
 class EchoTrail:
     """The echoes of the last few seconds, each put in the middle of its sensor's cone.
 
+    Of those that were heard from near by, the place is kept for good, in cells of 0.2 m: they
+    tell where walls are.
+
     Parameters
     ----------
     mounts : tuple of Pose2
@@ -49,6 +52,7 @@ class EchoTrail:
         self._now_s = 0.0
         self._ages = [math.inf] * len(SENSORS)
         self.echoes: deque[Echo] = deque()
+        self._cells: set[tuple[int, int]] = set()
 
     def hear(self, readings: Readings, pose: Pose2, dt: float) -> None:
         """Take what is new in `readings`, `dt` [s] after the last; `pose` is base_link in map."""
@@ -69,6 +73,8 @@ class EchoTrail:
                 )
                 until = self._now_s + self._memory_s
                 self.echoes.append(Echo(sensor, until, at.x, at.y, pose.heading))
+                if distance <= _SHARP_M:
+                    self._cells.add((round(at.x / _CELL_M), round(at.y / _CELL_M)))
 
     def in_strip(
         self, pose: Pose2, course: float, length: float, half_width: float
@@ -82,6 +88,18 @@ class EchoTrail:
             if 0.0 < along < nearest and abs(dy * cos - dx * sin) < half_width:
                 nearest, found = along, echo
         return found
+
+    def known_in_strip(
+        self, pose: Pose2, course: float, length: float, half_width: float
+    ) -> bool:
+        """Return whether anything that was ever heard near by lies in the strip."""
+        cos, sin = math.cos(course), math.sin(course)
+        for column, row in self._cells:
+            dx, dy = column * _CELL_M - pose.x, row * _CELL_M - pose.y
+            along = dx * cos + dy * sin
+            if 0.0 < along < length and abs(dy * cos - dx * sin) < half_width:
+                return True
+        return False
 
     def nearest_beside(self, pose: Pose2, side: int, length: float) -> float:
         """Return how far to a side of the robot's way ahead the nearest echo lies [m].
@@ -130,6 +148,8 @@ class EchoTrail:
         return course if math.cos(course - heading) >= 0.0 else course + math.pi
 
 
+_SHARP_M = 0.8  # from farther away the arc on which an echo may lie is too wide for a place
+_CELL_M = 0.2
 _SAME_FACE_RAD = 0.6  # what was heard at another heading is another face
 _LEAST_POINTS = 4
 _LEAST_SPREAD_M = 0.06  # several times the noise of an echo

@@ -22,6 +22,7 @@ _GAIN_M = 0.1
 _ASIDE_RAD = math.radians(25.0)  # what is heard by a slanting sensor is aside
 _FAR_M, _ALIKE_M = 2.0, 0.3
 _MOVED_M = 0.1
+_AT_ONCE_M, _NEAR_M = 1.0, 1.5
 _APART_M = 3.0  # of way: leaving the same place sooner is the same leaving
 
 
@@ -95,9 +96,11 @@ class ContourNavigator:
         if not (math.isfinite(target[0]) and math.isfinite(target[1])):
             raise ValueError('the target must be finite')
         self._target = target
+        self._trail.reset()
         self._mode = Mode.APPROACH
         self._reason = ''
         self._looks_far = True
+        self._met: list[tuple[float, Pose2, int]] = []  # and side of each meeting
         self._left: list[tuple[float, Pose2]] = []  # way and place of each leaving
         self._way_m = 0.0
         self._last: Pose2 | None = None
@@ -165,7 +168,9 @@ class ContourNavigator:
         self, readings: Readings, pose: Pose2, dt: float, away: float, course: float
     ) -> NavigatorStep:
         config = self.config
-        is_free = self._is_free(readings, pose, away, course, config.look)
+        is_free = self._is_free(
+            readings, pose, away, course, config.look
+        ) and not self._trail.known_in_strip(pose, course, away, config.hull_width)
         self._free_s = self._free_s + dt if is_free else 0.0
         nearer = away < self._met_m - config.gain
         opens = nearer and self._is_free(readings, pose, away, course, config.gap)
@@ -246,7 +251,21 @@ class ContourNavigator:
             wall = at.x, at.y
         else:
             wall = blocking.x, blocking.y
-        self._wall.begin(_side_of(wall, pose, used, bearing), wall)
+        at_once = bool(self._left) and self._way_m - self._left[-1][0] < _AT_ONCE_M
+        side = 0 if at_once else -self._side_before(pose)
+        side = side or _side_aside(wall, pose)
+        if at_once:  # right ahead still: the same contour
+            side = side or self._met[-1][2]
+        side = side or _side_freer(used, bearing)
+        self._met.append((self._way_m, pose, side))
+        self._wall.begin(side, wall)
+
+    def _side_before(self, pose: Pose2) -> int:
+        """Return on which side a contour was had that began near here, and has not led on; or 0."""
+        for way, place, side in reversed(self._met):
+            if self._way_m - way > _APART_M and place.distance_to(pose) < _NEAR_M:
+                return side
+        return 0
 
     def _measure(self, pose: Pose2, dt: float) -> None:
         """Keep count of the way, and of the time in which the robot did not move."""
@@ -266,17 +285,20 @@ class ContourNavigator:
         return NavigatorStep(Velocity(), self._mode, 0, away, False, self._reason)
 
 
-def _side_of(
-    wall: tuple[float, float], pose: Pose2, used: list[float], bearing: float
-) -> int:
-    """Return on which side to have a wall: where it is, so that the robot turns away from it.
-
-    If it is right ahead the robot turns to the freer side, or to the target's if both are alike.
-    """
+def _side_aside(wall: tuple[float, float], pose: Pose2) -> int:
+    """Return on which side of the robot a wall is; 0: right ahead."""
     course = math.atan2(wall[1] - pose.y, wall[0] - pose.x)
     aside = difference(course, pose.heading)
-    if abs(aside) > _ASIDE_RAD:
-        return LEFT if aside > 0.0 else RIGHT
+    if abs(aside) <= _ASIDE_RAD:
+        return 0
+    return LEFT if aside > 0.0 else RIGHT
+
+
+def _side_freer(used: list[float], bearing: float) -> int:
+    """Return the side to have a wall on that is right ahead.
+
+    The robot turns to the freer side, or to the target's if both are alike.
+    """
     left, right = (min(a, _FAR_M) + min(b, _FAR_M) for a, b in (used[:2], used[3:]))
     if abs(left - right) > _ALIKE_M:
         return RIGHT if left > right else LEFT
