@@ -151,7 +151,7 @@ def _shape(kind: str, rng: np.random.Generator) -> tuple[Line, ...]:
                 tuple((x - apart, y) for x, y in cup),
                 tuple((x + apart, y + aside) for x, y in cup),
             )
-        big_u, big_v = u + _PASSAGE_M, v + _PASSAGE_M + 0.1  # one in the other
+        big_u, big_v = u + _PASSAGE_M + _BOARD_M, v + _PASSAGE_M + _BOARD_M  # one in the other
         outer = ((-u, -big_v), (big_u, -big_v), (big_u, big_v), (-u, big_v))
         return (cup, outer)
     half = float(rng.uniform(1.0, 1.3))

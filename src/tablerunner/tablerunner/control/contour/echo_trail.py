@@ -148,7 +148,7 @@ class EchoTrail:
         return course if math.cos(course - heading) >= 0.0 else course + math.pi
 
 
-_SHARP_M = 0.8  # from farther away the arc on which an echo may lie is too wide for a place
+_SHARP_M = 1.6  # from farther away the arc on which an echo may lie is too wide for a place
 _CELL_M = 0.2
 _SAME_FACE_RAD = 0.6  # what was heard at another heading is another face
 _LEAST_POINTS = 4

@@ -22,7 +22,7 @@ _GAIN_M = 0.1
 _ASIDE_RAD = math.radians(25.0)  # what is heard by a slanting sensor is aside
 _FAR_M, _ALIKE_M = 2.0, 0.3
 _MOVED_M = 0.1
-_AT_ONCE_M, _NEAR_M = 1.0, 1.5
+_AT_ONCE_M, _NEAR_M = 1.0, 2.5
 _APART_M = 3.0  # of way: leaving the same place sooner is the same leaving
 
 
