@@ -30,7 +30,7 @@ KINDS = ('empty', 'box', *TRAPS, *CLOSED)
 
 _CLOSED_TARGET = (6.2, 6.2)  # with way to pass all round the boards
 _BOARD_M = 0.1
-_PASSAGE_M = 1.4  # every way through is at least so wide
+_PASSAGE_M = 1.5  # every way through is at least so wide
 _ROOM_AT_ENDS_M = 0.9  # start and target are at least so far from every wall
 _TRIES = 500
 
@@ -136,7 +136,7 @@ def _shape(kind: str, rng: np.random.Generator) -> tuple[Line, ...]:
         v += 0.5
         return (((-u, (v + flare_1) * mirror), (u, v * mirror), (u, -v * mirror)),)
     if kind == 'G':  # a lip across the opening, and its end turned in
-        v = max(v, 1.25)
+        v = max(v, 1.3)
         lip = 2.0 * v - _PASSAGE_M - float(rng.uniform(0.0, 0.3))
         inward = float(rng.uniform(0.2, 0.5))
         line = ((-u, -v - flare_1), (u, -v), (u, v), (-u, v), (-u, v - lip), (-u + inward, v - lip))

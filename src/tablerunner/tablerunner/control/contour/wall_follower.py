@@ -18,7 +18,8 @@ _FRONT_M = 0.1  # the front sensor needs so much more room than the side sensor
 _SLANT_M = 0.3
 _CLEARED_M = 0.08
 _AHEAD_M = 0.5  # what is to be passed on the other side counts so far ahead
-_BEYOND_M, _BEYOND_GAIN = 0.48, 3.0
+_TOUCH_M = 0.34  # the place of an echo is uncertain by a quarter of its distance
+_BEYOND_M, _BEYOND_GAIN = 0.58, 2.0
 _ACROSS_GAIN = 1.6  # angle towards the wall over distance too far [rad/m]
 _ACROSS_RAD = 0.5
 _TURN_GAIN = 2.5  # turn rate over heading error [1/s]
@@ -79,7 +80,7 @@ class WallFollower:
         self._turning = (
             front < config.distance + _FRONT_M + room
             or min(near, far) < _SLANT_M + room
-            or beyond < config.hull_width
+            or beyond < _TOUCH_M
         )
         if self._turning:
             self._note_wall(near, front, far, pose)
