@@ -22,7 +22,7 @@ _GAIN_M = 0.1
 _ASIDE_RAD = math.radians(25.0)  # what is heard by a slanting sensor is aside
 _FAR_M, _ALIKE_M = 2.0, 0.3
 _MOVED_M = 0.1
-_AT_ONCE_M, _NEAR_M = 1.0, 2.5
+_AT_ONCE_M, _NEAR_M, _FACE_M = 1.0, 2.5, 0.15
 _APART_M = 3.0  # of way: leaving the same place sooner is the same leaving
 
 
@@ -263,7 +263,12 @@ class ContourNavigator:
     def _side_before(self, pose: Pose2) -> int:
         """Return on which side a contour was had that began near here, and has not led on; or 0."""
         for way, place, side in reversed(self._met):
-            if self._way_m - way > _APART_M and place.distance_to(pose) < _NEAR_M:
+            away = place.distance_to(pose)
+            if self._way_m - way <= _APART_M or away >= _NEAR_M:
+                continue
+            course = math.atan2(place.y - pose.y, place.x - pose.x)
+            # Behind a wall it was another face.
+            if not self._trail.known_in_strip(pose, course, away, _FACE_M):
                 return side
         return 0
 
