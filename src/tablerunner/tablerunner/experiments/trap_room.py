@@ -101,7 +101,7 @@ def _try(kind: str, seed: int, rng: np.random.Generator) -> TrapRoom | None:
             return None
         walls = [_wall(f'trap {i}', line) for i, line in enumerate(lines, 1)]
     ends = np.array([start, target])
-    things = [thing.outline.segments for thing in (*walls, *boxes)]
+    things = [wall.outline.segments for wall in walls] + [box.outline.segments for box in boxes]
     if things and distance_to_segments(ends, np.concatenate(things)).min() < _ROOM_AT_ENDS_M:
         return None
     outer = Wall(((0.0, 0.0), (SIDE_M, 0.0), (SIDE_M, SIDE_M), (0.0, SIDE_M)), 'room', True)
@@ -139,7 +139,8 @@ def _shape(kind: str, rng: np.random.Generator) -> tuple[Line, ...]:
         v = max(v, 1.3)
         lip = 2.0 * v - _PASSAGE_M - float(rng.uniform(0.0, 0.3))
         inward = float(rng.uniform(0.2, 0.5))
-        line = ((-u, -v - flare_1), (u, -v), (u, v), (-u, v), (-u, v - lip), (-u + inward, v - lip))
+        hook = ((-u, v - lip), (-u + inward, v - lip))
+        line = ((-u, -v - flare_1), (u, -v), (u, v), (-u, v), *hook)
         return (tuple((x, y * mirror) for x, y in line),)
     if kind == 'double':
         u, v = min(u, 0.9), min(v, 1.2)
@@ -175,7 +176,7 @@ def _wall(name: str, line: Array) -> Wall:
 
 
 def _wing(base: Array) -> Array:
-    """Return a partition that goes on from the base's end (its second corner) to the room's wall."""
+    """Return a partition that goes on from the second corner of the base to the room's wall."""
     end, along = base[1], base[1] - base[0]
     along = along / np.linalg.norm(along)
     room = np.where(along > 0.0, SIDE_M - end, end) / np.maximum(np.abs(along), 1e-9)
@@ -186,9 +187,7 @@ def _points(points: Array) -> Line:
     return tuple((float(x), float(y)) for x, y in points)
 
 
-def shortest_way(
-    scenario: Scenario, target: tuple[float, float], clearance: float
-) -> Path | None:
+def shortest_way(scenario: Scenario, target: tuple[float, float], clearance: float) -> Path | None:
     """Return the shortest way of the hull to a target, kept `clearance` [m] from everything.
 
     Nothing is added for being near: that is for comfort.

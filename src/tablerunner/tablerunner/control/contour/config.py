@@ -16,7 +16,7 @@ class ContourConfig(Config):
 
     leave: str = parameter(
         'free',
-        description='Leave where the target direction is free, or, as before, nearer than it began',
+        description='Leave where the target direction is free; or nearer than it began, as before',
         choices=LEAVE,
     )
     distance: float = parameter(

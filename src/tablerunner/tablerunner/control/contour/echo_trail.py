@@ -12,7 +12,7 @@ from tablerunner.geometry.pose import Pose2
 
 
 class Echo(NamedTuple):
-    """One echo: sensor (index in `SENSORS`), time left to count [s], place in map, heading then."""
+    """One echo: sensor (index in `SENSORS`), until when it counts, place in map, heading then."""
 
     sensor: int
     until_s: float
@@ -89,9 +89,7 @@ class EchoTrail:
                 nearest, found = along, echo
         return found
 
-    def known_in_strip(
-        self, pose: Pose2, course: float, length: float, half_width: float
-    ) -> bool:
+    def known_in_strip(self, pose: Pose2, course: float, length: float, half_width: float) -> bool:
         """Return whether anything that was ever heard near by lies in the strip."""
         cos, sin = math.cos(course), math.sin(course)
         for column, row in self._cells:

@@ -84,6 +84,7 @@ class ContourNavigator:
         self._wall = WallFollower(config, self._trail)
         self._round = RoundWatch(config.shortest_round)
         self._target: tuple[float, float] | None = None
+        self._forget()
 
     def go(self, target: tuple[float, float]) -> None:
         """Take a target, x and y in map [m]; what was learned on the way to the last is forgotten.
@@ -96,6 +97,9 @@ class ContourNavigator:
         if not (math.isfinite(target[0]) and math.isfinite(target[1])):
             raise ValueError('the target must be finite')
         self._target = target
+        self._forget()
+
+    def _forget(self) -> None:
         self._trail.reset()
         self._mode = Mode.APPROACH
         self._reason = ''
@@ -106,7 +110,9 @@ class ContourNavigator:
         self._last: Pose2 | None = None
         self._rest: Pose2 | None = None
         self._still_s = 0.0
-        self._begin_approach()
+        self._met_m = math.inf  # target distance where the contour began
+        self._free_s = self._open_s = 0.0
+        self._nearest_m, self._no_gain_s = math.inf, 0.0
 
     def step(self, readings: Readings, pose: Pose2, dt: float) -> NavigatorStep:
         """Return what to do now; `pose` is base_link in map, `dt` [s] since the last step.
@@ -116,14 +122,15 @@ class ContourNavigator:
         ValueError
             No target was given, or the pose is not finite.
         """
-        if self._target is None:
+        target = self._target
+        if target is None:
             raise ValueError('there is no target to go to')
         if not pose.is_finite:
             raise ValueError('the pose is not finite')
         self._trail.hear(readings, pose, dt)
         self._measure(pose, dt)
-        east, north = self._target[0] - pose.x, self._target[1] - pose.y
-        away, course = math.hypot(east, north), math.atan2(north, east)
+        east, north = target[0] - pose.x, target[1] - pose.y
+        away = math.hypot(east, north)
         if self._mode in (Mode.ARRIVED, Mode.UNREACHABLE):
             return self._stand(away)
         if away <= self.config.position_tolerance:
@@ -134,14 +141,13 @@ class ContourNavigator:
         if self._still_s > self.config.stuck_after:
             return self._give_up(away, f'stands still since {self._still_s:.0f} s')
         if self._mode is Mode.APPROACH:
-            return self._approach(readings, pose, dt, away, course)
-        return self._along(readings, pose, dt, away, course)
+            return self._approach(readings, pose, target, dt, away)
+        return self._along(readings, pose, target, dt, away)
 
     def _approach(
-        self, readings: Readings, pose: Pose2, dt: float, away: float, course: float
+        self, readings: Readings, pose: Pose2, target: tuple[float, float], dt: float, away: float
     ) -> NavigatorStep:
-        target = self._target
-        assert target is not None  # noqa: S101
+        course = math.atan2(target[1] - pose.y, target[0] - pose.x)
         config = self.config
         if away < self._nearest_m - _GAIN_M:
             self._nearest_m, self._no_gain_s = away, 0.0
@@ -165,8 +171,9 @@ class ContourNavigator:
         return NavigatorStep(velocity, Mode.APPROACH, 0, away, True)
 
     def _along(
-        self, readings: Readings, pose: Pose2, dt: float, away: float, course: float
+        self, readings: Readings, pose: Pose2, target: tuple[float, float], dt: float, away: float
     ) -> NavigatorStep:
+        course = math.atan2(target[1] - pose.y, target[0] - pose.x)
         config = self.config
         is_free = self._is_free(
             readings, pose, away, course, config.look
@@ -178,7 +185,7 @@ class ContourNavigator:
         if self._may_leave(pose, nearer) or self._wall.is_lost:
             self._left.append((self._way_m, pose))
             self._begin_approach()
-            return self._approach(readings, pose, dt, away, course)
+            return self._approach(readings, pose, target, dt, away)
         if self._round.step(pose):
             return self._give_up(away, 'went round without a way out')
         return self._contour_step(readings, pose, away, is_free)
@@ -232,8 +239,7 @@ class ContourNavigator:
 
     def _begin_approach(self) -> None:
         self._mode = Mode.APPROACH
-        self._nearest_m = math.inf
-        self._no_gain_s = 0.0
+        self._nearest_m, self._no_gain_s = math.inf, 0.0
 
     def _begin_contour(
         self, readings: Readings, pose: Pose2, away: float, bearing: float, blocking: Echo | None
@@ -261,7 +267,7 @@ class ContourNavigator:
         self._wall.begin(side, wall)
 
     def _side_before(self, pose: Pose2) -> int:
-        """Return on which side a contour was had that began near here, and has not led on; or 0."""
+        """Return on which side a contour was had that began near here; 0: there was none."""
         for way, place, side in reversed(self._met):
             away = place.distance_to(pose)
             if self._way_m - way <= _APART_M or away >= _NEAR_M:
