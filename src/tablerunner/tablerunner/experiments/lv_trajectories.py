@@ -37,9 +37,12 @@ class Trial:
 
     @property
     def ratio(self) -> float:
-        """Way driven over the shortest way; NaN where there is none."""
+        """Way driven, and what is left to the target, over the shortest way; NaN: none."""
         shortest = self.room.shortest
-        return math.nan if shortest is None else self.improved.way_m / shortest.length
+        if shortest is None:
+            return math.nan
+        left = math.dist(self.improved.track[-1], self.room.target)
+        return (self.improved.way_m + left) / shortest.length
 
 
 @dataclass(frozen=True, eq=False)
