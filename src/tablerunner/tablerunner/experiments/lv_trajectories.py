@@ -144,9 +144,8 @@ def draw_trajectories(figure: Any, run: LvDrives) -> None:
     """Draw figures 10 and 11 and a trap room of each kind, with both methods."""
     trials = [('without obstacle', run.empty), ('one obstacle', run.box)]
     trials += [(f'{trial.room.kind} trap', trial) for trial in run.traps[: len(TRAPS)]]
-    for axes, (title, trial) in zip(
-        figure.subplots(2, 3, sharex=True, sharey=True).ravel(), trials, strict=False
-    ):
+    everything = figure.subplots(2, 3, sharex=True, sharey=True)
+    for axes, (title, trial) in zip(everything.ravel(), trials, strict=False):
         for segment in trial.room.scenario.obstacle_segments():
             axes.plot(segment[:, 0], segment[:, 1], color='#4A4A4A', linewidth=1.2)
         shortest = trial.room.shortest
@@ -161,6 +160,8 @@ def draw_trajectories(figure: Any, run: LvDrives) -> None:
         axes.set_xticks([0, 5, 10])
         axes.set_yticks([0, 5, 10])
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside lower center', ncols=3)
-    figure.supxlabel('x [m]')
-    figure.supylabel('y [m]')
+    everything[0, 0].legend(handles, labels, loc='lower right')
+    for axes in everything[1]:
+        axes.set_xlabel('x [m]')
+    for axes in everything[:, 0]:
+        axes.set_ylabel('y [m]')

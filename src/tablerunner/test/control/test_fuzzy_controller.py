@@ -9,7 +9,7 @@ import pytest
 
 from tablerunner.control import Path, VelocityLimits, sensor_mounts
 from tablerunner.control.controller import Controller
-from tablerunner.control.fuzzy import SENSORS, UltrasonicRing
+from tablerunner.control.fuzzy import SENSORS, Readings, UltrasonicRing
 from tablerunner.control.fuzzy_controller import FuzzyController
 from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
@@ -82,6 +82,21 @@ def test_box_beside_the_path_is_passed_on_the_path() -> None:
     assert drives[-1].arrived
     assert max(PATH.project(pose.x, pose.y)[1] for pose in poses) < 0.15
     assert gap > 0.05
+
+
+@pytest.mark.parametrize(('heading', 'leaves'), [(0.0, True), (0.35, False), (-0.35, False)])
+def test_echo_counts_when_it_is_in_the_path_wherever_in_the_cone(heading, leaves) -> None:
+    """0.92 m away; turned by 0.35 rad, one end of the arc is 0.1 m from the path, one 0.5 m."""
+    heard = Readings((math.inf, math.inf, 0.7, math.inf, math.inf))
+    with_echo, without = make(), make()
+    for controller in (with_echo, without):
+        controller.follow(PATH)
+    pose = Pose2(2.0, 1.5, heading)
+    same = True
+    for _ in range(8):
+        with_echo.hear(heard)
+        same = same and with_echo.step(pose, DT).velocity == without.step(pose, DT).velocity
+    assert same is not leaves
 
 
 def test_closed_passage_is_told_and_the_robot_stands() -> None:

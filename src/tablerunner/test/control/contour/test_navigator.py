@@ -122,6 +122,43 @@ def test_wall_aside_is_kept_on_its_side(world) -> None:
         assert (step.mode, step.side) == (Mode.CONTOUR, side)
 
 
+def test_hull_strip_right_ahead_counts_wherever_the_target_is(world) -> None:
+    """A corner that the hull would graze, 0.27 m aside, while the target is 0.7 rad off."""
+    robot = navigator(world)
+    robot.go((4.6, 3.9))
+    heard = Readings((INF, INF, INF, 0.2, INF))
+    step = robot.step(heard, Pose2(), DT)
+    assert (step.mode, step.side) == (Mode.CONTOUR, -1)
+
+
+def test_beyond_a_wall_that_is_followed_the_target_direction_is_not_free(world) -> None:
+    """Although no sensor hears anything there: the wall goes on."""
+    for north, is_free in ((2.0, False), (-2.0, True)):
+        robot = navigator(world)
+        robot.go((0.0, 0.0))
+        robot.step(Readings((INF, 0.15, INF, INF, INF)), Pose2(-9.0, -north, 0.0), DT)
+        for x in np.arange(-7.0, -5.0, 0.02):  # the wall on the left, 0.57 m away
+            heard = Readings((0.35, INF, INF, INF, INF))
+            step = robot.step(heard, Pose2(x, -north, 0.0), DT)
+            if step.is_free:
+                break
+        assert step.is_free is is_free
+
+
+def test_wall_met_again_on_the_same_face_is_taken_the_other_way(world) -> None:
+    ahead = Readings((INF, INF, 0.3, INF, INF))
+    for back, expected in ((Pose2(0.0, 0.3, 0.0), -1), (Pose2(0.0, 4.0, 0.0), 1)):
+        robot = navigator(world)
+        robot.go((9.0, 0.0))
+        first = robot.step(ahead, Pose2(), DT)
+        assert (first.mode, first.side) == (Mode.CONTOUR, 1)
+        for _ in range(80):  # the echo is forgotten, the target direction free
+            step = robot.step(FREE, Pose2(0.0, -2.5, 0.27), DT)
+        assert step.mode is Mode.APPROACH
+        again = robot.step(ahead, back, DT)
+        assert (again.mode, again.side) == (Mode.CONTOUR, expected)
+
+
 def test_unusable_input_is_refused(world) -> None:
     robot = navigator(world)
     with pytest.raises(ValueError, match='no target'):

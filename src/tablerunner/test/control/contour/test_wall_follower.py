@@ -81,6 +81,18 @@ def test_inner_corners_are_turned_in(world, side) -> None:
     assert any(watch.step(pose) for pose in poses)
 
 
+@pytest.mark.parametrize('side', [LEFT, RIGHT])
+@pytest.mark.parametrize(('off', 'least'), [(0.42, 0.2), (0.3, 0.06)])
+def test_keeps_off_what_stands_across_the_passage(world, side, off, least) -> None:
+    """A post beside its way, `off` from its middle: without it, 0.17 or 0.05 m from the hull."""
+    post = np.array([[3.0, -off], [3.1, -off], [3.1, -off - 0.1], [3.0, -off - 0.1]])
+    walls = np.concatenate([[[[-2.0, 0.57], [18.0, 0.57]]], polygon_edges(post)])
+    walls[..., 1] *= side
+    poses = along(world, walls, Pose2(), side, (0.0, 0.57 * side), 400)
+    places = np.array([(pose.x, pose.y) for pose in poses])
+    assert distance_to_segments(places, walls).min() - 0.25 > least
+
+
 def test_way_back_on_the_other_side_of_a_thin_wall_is_no_round() -> None:
     """The same places to 0.2 m, in the other direction."""
     watch = RoundWatch(2.5)
