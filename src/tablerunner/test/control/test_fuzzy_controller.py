@@ -32,13 +32,13 @@ def make() -> FuzzyController:
     )
 
 
-def drive(things: tuple, limit_s: float = 150.0, start: Pose2 | None = None):
-    """Return poses, drives and the controller after following PATH in a room with things."""
+def drive(things: tuple, limit_s: float = 150.0, path: Path = PATH):
+    """Return poses, drives, gap and controller after following a path in a room with things."""
     scenario = Scenario(name='room', walls=(ROOM,), boxes=things, start=(1.0, 1.5, 0.0))
     sonar = Sonar(scenario, np.random.default_rng(3))
     controller, ring, now = make(), UltrasonicRing(), NANOSECONDS
-    controller.follow(PATH)
-    poses, drives = [start or scenario.start_pose], []
+    controller.follow(path)
+    poses, drives = [scenario.start_pose], []
     for number in range(round(2 * limit_s / DT)):
         ring.add(sonar.fire(now, poses[-1], ()), now)
         now += nanoseconds(DT / 2)
@@ -74,6 +74,16 @@ def test_box_in_the_path_is_gone_round(x: float, aside: float) -> None:
     assert gap > 0.05
     assert drives[-1].cross_track < 0.25
     assert max(step.cross_track for step in drives) > 0.3  # it was in the path
+
+
+def test_path_is_taken_up_again_where_it_is_met() -> None:
+    """Out and back 0.8 m apart; the way round the box cuts the far end off."""
+    path = Path(np.array([[1.0, 1.5], [3.0, 1.5], [3.0, 2.3], [1.0, 2.3]]))
+    poses, drives, gap, _ = drive((Box('box', 2.7, 1.5, 0.6, 0.6),), 40.0, path)
+    assert drives[-1].arrived
+    assert gap > 0.05
+    back = next(i for i, pose in enumerate(poses) if pose.y > 2.2)
+    assert min(pose.y for pose in poses[back:]) > 2.0
 
 
 def test_box_beside_the_path_is_passed_on_the_path() -> None:

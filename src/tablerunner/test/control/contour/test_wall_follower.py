@@ -82,9 +82,9 @@ def test_inner_corners_are_turned_in(world, side) -> None:
 
 
 @pytest.mark.parametrize('side', [LEFT, RIGHT])
-@pytest.mark.parametrize(('off', 'least'), [(0.42, 0.2), (0.3, 0.06)])
+@pytest.mark.parametrize(('off', 'least'), [(0.42, 0.2), (0.3, 0.06), (0.1, 0.02)])
 def test_keeps_off_what_stands_across_the_passage(world, side, off, least) -> None:
-    """A post beside its way, `off` from its middle: without it, 0.17 or 0.05 m from the hull."""
+    """A post `off` beside its way would be 0.17 or 0.05 m from the hull, or hit it."""
     post = np.array([[3.0, -off], [3.1, -off], [3.1, -off - 0.1], [3.0, -off - 0.1]])
     walls = np.concatenate([[[[-2.0, 0.57], [18.0, 0.57]]], polygon_edges(post)])
     walls[..., 1] *= side
