@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from tablerunner.estimation.estimator import Estimator, Measurement, Start
 from tablerunner.estimation.localizer import Localizer, Outcome
@@ -11,7 +12,7 @@ from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.timeline import Timeline
 from tablerunner.estimation.track import OdometryTrack
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, OdometrySample, nanoseconds
+from tablerunner.types import Anchor, Estimate, OdometrySample, RangeSample, nanoseconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +23,14 @@ class Step:
     motion: Motion | None  # since the step before; None: no time has passed
     measurement: Measurement | None
     after: Estimate
+
+
+class Lead(NamedTuple):
+    """An instant before the start of an estimator."""
+
+    stamp: int
+    measurement: Measurement | None  # what the start was found from
+    onward: Motion  # to the next instant, from the last one to the start
 
 
 @dataclass(frozen=True)
@@ -38,26 +47,31 @@ class Run:
         What it made of the start.
     steps : tuple of Step
         All steps, in order of their stamps.
-    lead_in : tuple of (int, Motion)
-        Odometry from before the start, which was found later: stamps in order, each with the
-        motion from there to the next (the last one: to the start).
+    lead_in : tuple of Lead
+        Odometry and ranges from before the start, in order, as far back as the start was sought.
     """
 
     estimator: Estimator
     start: Start
     first: Estimate
     steps: tuple[Step, ...]
-    lead_in: tuple[tuple[int, Motion], ...]
+    lead_in: tuple[Lead, ...]
 
 
 class _WholeTimeline(Timeline):
     """A timeline that forgets nothing, and yet takes nothing that is older than the history."""
 
     def __init__(
-        self, estimator: Estimator, track: OdometryTrack, start: Start, history: int
+        self,
+        estimator: Estimator,
+        track: OdometryTrack,
+        start: Start,
+        history: int,
+        early: list[RangeSample],
     ) -> None:
         super().__init__(estimator, track, start, history)
         self._start = start
+        self._early = early
         self._oldest = start.stamp
 
     @property
@@ -79,14 +93,20 @@ class _WholeTimeline(Timeline):
             motion = self._track.motion(before, stamp) if stamp > before else None
             steps.append(Step(stamp, motion, entry.measurement, entry.after))
             before = max(before, stamp)
-        start = self._start.stamp
-        oldest = self._track.oldest_stamp
-        stamps = [s for s in (oldest, *self._track.stamps_after(oldest)) if s < start]
-        lead_in = tuple(
-            (stamp, self._track.motion(stamp, after))
-            for stamp, after in zip(stamps, [*stamps[1:], start], strict=True)
+        return Run(self.estimator, self._start, first.after, tuple(steps), self._lead_in())
+
+    def _lead_in(self) -> tuple[Lead, ...]:
+        start, oldest = self._start.stamp, self._track.oldest_stamp
+        instants: list[tuple[int, RangeSample | None]] = [
+            (stamp, None) for stamp in (oldest, *self._track.stamps_after(oldest)) if stamp < start
+        ]
+        instants += [(item.stamp, item) for item in self._early if oldest <= item.stamp < start]
+        instants.sort(key=_stamp)
+        following = [*(stamp for stamp, _ in instants[1:]), start]
+        return tuple(
+            Lead(stamp, measurement, self._track.motion(stamp, after))
+            for (stamp, measurement), after in zip(instants, following, strict=True)
         )
-        return Run(self.estimator, self._start, first.after, tuple(steps), lead_in)
 
 
 class RecordingLocalizer(Localizer):
@@ -95,6 +115,7 @@ class RecordingLocalizer(Localizer):
     def __init__(self, config: LocalizerConfig, anchors: tuple[Anchor, ...] = ()) -> None:
         self._ended: list[Run] = []
         self._whole: _WholeTimeline | None = None
+        self._early: list[RangeSample] = []
         super().__init__(config, anchors)
 
     def runs(self) -> tuple[Run, ...]:
@@ -107,11 +128,22 @@ class RecordingLocalizer(Localizer):
             self._end()  # before the track of a lost run is trimmed
         return super().add_odometry(sample)
 
+    def add_range(self, sample: RangeSample) -> Outcome:
+        """Take a range as `Localizer` does."""
+        if self._timeline is not None:
+            return super().add_range(sample)
+        self._early.append(sample)
+        outcome = super().add_range(sample)
+        if outcome.refusals:
+            self._early.remove(sample)
+        return outcome
+
     def _begin(self, start: Start) -> None:
         self._end()
         super()._begin(start)
+        early, self._early = self._early, []
         self._whole = _WholeTimeline(
-            self._new_estimator(), self._track, start, nanoseconds(self.config.history)
+            self._new_estimator(), self._track, start, nanoseconds(self.config.history), early
         )
         self._timeline = self._whole
 
@@ -119,3 +151,7 @@ class RecordingLocalizer(Localizer):
         if self._whole is not None:
             self._ended.append(self._whole.run())
         self._whole = None
+
+
+def _stamp(instant: tuple[int, RangeSample | None]) -> int:
+    return instant[0]

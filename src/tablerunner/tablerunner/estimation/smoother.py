@@ -26,9 +26,12 @@ from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import Estimate, Matrix
 
+SMOOTHED = ('ekf', 'ukf', 'dead_reckoning')
+"""Estimators that can be smoothed: the others keep no covariance that F P F' + Q explains."""
+
 _HEADING = 2  # of every estimator: the only angle of a state
 _STEP = 1e-5  # of the differences: units are m, rad, and fractions of 1
-_RELATIVE_NOTHING = 1e-12  # eigenvalue of a correlation matrix that counts as none
+_NOTHING = 1e-12  # eigenvalue of a correlation matrix that counts as none
 
 
 def smooth(run: Run) -> list[Estimate]:
@@ -115,16 +118,15 @@ def extend_back(run: Run, start: Estimate) -> list[Estimate]:
         Smoothed estimate of the start.
     """
     estimates = [start]
-    for stamp, motion in run.lead_in[::-1]:
-        back = Motion(-motion.distance_m, -motion.turn_rad, -motion.dt_s)
-        estimates.append(_undone(run.estimator, estimates[-1], back, motion, stamp))
+    for lead in run.lead_in[::-1]:
+        if lead.stamp < estimates[-1].stamp:
+            estimates.append(_undone(run.estimator, estimates[-1], lead.onward, lead.stamp))
     return estimates[:0:-1]
 
 
-def _undone(
-    estimator: Estimator, later: Estimate, back: Motion, motion: Motion, stamp: int
-) -> Estimate:
+def _undone(estimator: Estimator, later: Estimate, motion: Motion, stamp: int) -> Estimate:
     # The mean goes back by the motion turned round; the noise is that of the motion itself.
+    back = Motion(-motion.distance_m, -motion.turn_rad, -motion.dt_s)
     mean = estimator.predict(later, back, stamp).mean
     earlier = replace(later, stamp=stamp, mean=mean)
     certain = replace(earlier, covariance=np.zeros_like(later.covariance))
@@ -143,7 +145,7 @@ def inverse_of_covariance(covariance: Matrix) -> Matrix:
     deviation = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
     scale = np.divide(1.0, deviation, out=np.zeros_like(deviation), where=deviation > 0.0)
     values, vectors = np.linalg.eigh(covariance * scale[:, None] * scale)
-    kept = values > _RELATIVE_NOTHING * max(float(values[-1]), 0.0)
+    kept = values > _NOTHING * max(float(values[-1]), 0.0)
     root = vectors[:, kept] / np.sqrt(values[kept]) * scale[:, None]
     return np.asarray(root @ root.T)
 
