@@ -117,8 +117,7 @@ class Replayed:
         if self.from_s > 0.0:
             words = f'from {self.from_s:g} s on'
             lines.append(
-                f'{words:<14} rmse {late.rmse:.3f} m, mean {late.mean:.3f} m, '
-                f'max {late.max:.3f} m'
+                f'{words:<14} rmse {late.rmse:.3f} m, mean {late.mean:.3f} m, max {late.max:.3f} m'
                 if late.count
                 else f'{words:<14} no truth'
             )

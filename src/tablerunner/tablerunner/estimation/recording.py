@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -70,6 +71,7 @@ class _WholeTimeline(Timeline):
         early: list[RangeSample],
     ) -> None:
         super().__init__(estimator, track, start, history)
+        self._whole_track = deepcopy(track)
         self._start = start
         self._early = early
         self._oldest = start.stamp
@@ -79,10 +81,16 @@ class _WholeTimeline(Timeline):
         """Stamp before which nothing can be taken any more."""
         return self._oldest
 
+    def add_odometry(self, sample: OdometrySample) -> None:
+        """Add an odometry sample as `Timeline` does."""
+        self._whole_track.add(sample)
+        super().add_odometry(sample)
+
     def _trim(self) -> None:
         horizon = self._keys[-1][0] - self._history
         kept = max(bisect_right(self._keys, (horizon, 99, '')) - 1, 0)
         self._oldest = max(self._oldest, self._keys[kept][0])
+        self._track.trim(self._oldest)  # as much as others see of it
 
     def run(self) -> Run:
         """Return the run so far."""
@@ -90,21 +98,21 @@ class _WholeTimeline(Timeline):
         steps, before = [], first.after.stamp
         for entry in entries:
             stamp = entry.key[0]
-            motion = self._track.motion(before, stamp) if stamp > before else None
+            motion = self._whole_track.motion(before, stamp) if stamp > before else None
             steps.append(Step(stamp, motion, entry.measurement, entry.after))
             before = max(before, stamp)
         return Run(self.estimator, self._start, first.after, tuple(steps), self._lead_in())
 
     def _lead_in(self) -> tuple[Lead, ...]:
-        start, oldest = self._start.stamp, self._track.oldest_stamp
-        instants: list[tuple[int, RangeSample | None]] = [
-            (stamp, None) for stamp in (oldest, *self._track.stamps_after(oldest)) if stamp < start
-        ]
+        start, oldest = self._start.stamp, self._whole_track.oldest_stamp
+        stamps = [oldest, *self._whole_track.stamps_after(oldest)]
+        instants: list[tuple[int, RangeSample | None]]
+        instants = [(stamp, None) for stamp in stamps if stamp < start]
         instants += [(item.stamp, item) for item in self._early if oldest <= item.stamp < start]
         instants.sort(key=_stamp)
-        following = [*(stamp for stamp, _ in instants[1:]), start]
+        following = [*(stamp for stamp, _ in instants), start][1:]
         return tuple(
-            Lead(stamp, measurement, self._track.motion(stamp, after))
+            Lead(stamp, measurement, self._whole_track.motion(stamp, after))
             for (stamp, measurement), after in zip(instants, following, strict=True)
         )
 
@@ -113,20 +121,13 @@ class RecordingLocalizer(Localizer):
     """A localiser that does the same and remembers all of it; memory grows with time."""
 
     def __init__(self, config: LocalizerConfig, anchors: tuple[Anchor, ...] = ()) -> None:
-        self._ended: list[Run] = []
-        self._whole: _WholeTimeline | None = None
+        self._timelines: list[_WholeTimeline] = []
         self._early: list[RangeSample] = []
         super().__init__(config, anchors)
 
     def runs(self) -> tuple[Run, ...]:
         """Return the runs so far: a new one began wherever the estimator began anew."""
-        return (*self._ended, *(() if self._whole is None else (self._whole.run(),)))
-
-    def add_odometry(self, sample: OdometrySample) -> Outcome:
-        """Take odometry as `Localizer` does."""
-        if self._timeline is None:
-            self._end()  # before the track of a lost run is trimmed
-        return super().add_odometry(sample)
+        return tuple(timeline.run() for timeline in self._timelines)
 
     def add_range(self, sample: RangeSample) -> Outcome:
         """Take a range as `Localizer` does."""
@@ -139,18 +140,13 @@ class RecordingLocalizer(Localizer):
         return outcome
 
     def _begin(self, start: Start) -> None:
-        self._end()
         super()._begin(start)
         early, self._early = self._early, []
-        self._whole = _WholeTimeline(
+        timeline = _WholeTimeline(
             self._new_estimator(), self._track, start, nanoseconds(self.config.history), early
         )
-        self._timeline = self._whole
-
-    def _end(self) -> None:
-        if self._whole is not None:
-            self._ended.append(self._whole.run())
-        self._whole = None
+        self._timelines.append(timeline)
+        self._timeline = timeline
 
 
 def _stamp(instant: tuple[int, RangeSample | None]) -> int:

@@ -15,7 +15,6 @@ For a linear model with Gaussian noise this is the exact posterior.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -152,7 +151,7 @@ def inverse_of_covariance(covariance: Matrix) -> Matrix:
 
 def without_negative(covariance: Matrix) -> Matrix:
     """Return a covariance without the negative eigenvalues that rounding gave it."""
-    symmetric = 0.5 * (covariance + covariance.T)
+    symmetric: Matrix = 0.5 * (covariance + covariance.T)
     values, vectors = np.linalg.eigh(symmetric)
     if values[0] >= 0.0:
         return symmetric
