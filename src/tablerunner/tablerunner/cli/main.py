@@ -16,6 +16,7 @@ from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
 from tablerunner.cli.reproduce import reproduce
+from tablerunner.cli.tune import tune
 from tablerunner.errors import BagError, ConfigError, TablerunnerError
 
 GROUP = 'tablerunner.commands'
@@ -36,6 +37,7 @@ def make_app() -> typer.Typer:
     app.command()(replay)
     app.command()(info)
     app.command()(plot)
+    app.command()(tune)
     app.command()(reproduce)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')
