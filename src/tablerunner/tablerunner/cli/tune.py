@@ -1,4 +1,4 @@
-"""`tablerunner tune`: noise of odometry and ranges from the innovations of a bag, without truth."""
+"""`tablerunner tune`: noise from the innovations of a bag, without truth."""
 
 import time
 from pathlib import Path
@@ -66,9 +66,8 @@ def tune(
     begun = time.perf_counter()
     config = replay_config(find_scenario(bag, scenario), estimator, start, namespace)
     drives, anchors = _drives(bag, config)
-    make = partial(
-        ESTIMATORS[estimator], anchors=anchors, lever_arm=config.localizer.tag_position
-    )
+    x, y, z = config.localizer.tag_position
+    make = partial(ESTIMATORS[estimator], anchors=anchors, lever_arm=(x, y, z))
     with Bar(f'tuning on {bag}') as bar:
         found = core.tune(
             make,
@@ -93,9 +92,7 @@ def tune(
         write_json(json_file, report.figures())
 
 
-def _drives(
-    bag: Path, config: 'ReplayConfig'
-) -> 'tuple[list[Drive], tuple[Anchor, ...]]':
+def _drives(bag: Path, config: 'ReplayConfig') -> 'tuple[list[Drive], tuple[Anchor, ...]]':
     """Return the drives of a bag, decoded once, and the anchors that were used."""
     from dataclasses import replace as changed
 

@@ -120,7 +120,7 @@ class TuneReport:
 
     def parameter_text(self) -> str:
         """Return a parameter file with what was tuned; what was not stands in comments."""
-        filter_lines: list[str] = []
+        own: list[str] = []
         nested: dict[str, list[str]] = {}
         driver: list[str] = []
         for item in self.tuning.parameters:
@@ -132,28 +132,25 @@ class TuneReport:
             if parts[0] == 'uwb_driver':
                 driver.append(line)
             elif len(parts) == 1:
-                filter_lines.append(line)
+                own.append(line)
             else:
                 nested.setdefault(parts[1], []).append(line)
-        text = ['/**/fusion_node:', '  ros__parameters:']
-        # A heading with nothing but comments under it would be no map but nothing, an error.
-        text += _section('filter', filter_lines, nested)
-        if driver:
-            empty = all(line.startswith('#') for line in driver)
-            text += ['# /**/uwb_driver:' if empty else '/**/uwb_driver:']
-            text += ['#   ros__parameters:' if empty else '  ros__parameters:']
-            text += [f'    {line}' for line in driver]
-        return '\n'.join(text)
+        fusion = own + [
+            line for title, lines in nested.items() for line in _mapping(f'{title}:', lines)
+        ]
+        nodes = {'fusion_node': _mapping('filter:', fusion), 'uwb_driver': driver}
+        return '\n'.join(
+            line
+            for name, lines in nodes.items()
+            if lines
+            for line in _mapping(f'/**/{name}:', _mapping('ros__parameters:', lines))
+        )
 
 
-def _section(title: str, own: list[str], nested: dict[str, list[str]]) -> list[str]:
-    lines = [f'      {line}' for line in own]
-    for name, items in nested.items():
-        empty = all(item.startswith('#') for item in items)
-        lines.append(f'      {"# " if empty else ""}{name}:')
-        lines += [f'        {item}' for item in items]
+def _mapping(title: str, lines: list[str]) -> list[str]:
+    """Return lines under a title, which is a comment when all of them are: else it were null."""
     empty = all(line.lstrip().startswith('#') for line in lines)
-    return [f'    {"# " if empty else ""}{title}:', *lines]
+    return [f'{"# " if empty else ""}{title}', *(f'  {line}' for line in lines)]
 
 
 def parameter_name(item: Tuned) -> str:

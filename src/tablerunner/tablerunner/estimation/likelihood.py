@@ -82,7 +82,7 @@ class RangeInnovations:
 
 
 def drive_of(run: Run) -> Drive:
-    """Return the drive of a run, from the beginning of the search for its start where there is one.
+    """Return the drive of a run, from where the search for its start began, if there was one.
 
     The pose that the smoothed run is led back to is where to linearise; its deviations are
     multiplied by 3, since it was found from ranges that are to be judged.

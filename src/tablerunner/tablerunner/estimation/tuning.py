@@ -1,12 +1,13 @@
 """Noise of an estimator from the innovations of recorded drives, without any truth.
 
 The logarithms of a few parameters are moved to where the log likelihood of the ranges
-(`likelihood`) plus that of a prior is greatest (L-BFGS-B of SciPy). The prior says of each
+(`likelihood`) plus that of a prior is greatest (SciPy, trust region). The prior says of each
 parameter that its default is right within a factor of 3 (one standard deviation, normal in the
 logarithm). Then parameters go back to their defaults, one after the other, least missed first,
-as long as that costs less than 1 in the logarithm (Akaike: so much any parameter gains by chance),
-the others being sought anew each time. What stays is tuned; of the rest it is said whether the data
-confirm the default (they know the parameter better than the prior does) or cannot tell.
+as long as that costs less than 1.92 in the logarithm (what one parameter in twenty gains by mere
+chance: the likelihood ratio test at 5 %), the others being sought anew each time. What stays is
+tuned; of the rest it is said whether the data confirm the default (they know the parameter better
+than the prior does) or cannot tell.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tablerunner.config.parameter import Config, parameters_of
@@ -47,11 +49,14 @@ FEWEST_RANGES = 50
 """With fewer nothing is tuned."""
 
 _PRIOR_STD = math.log(PRIOR_FACTOR)
-_FARTHEST = math.log(30.0)  # from the default
-_STEP = 0.05  # of the differences: acceptance at the gate makes small ones rough
-_MISSED = 1.0  # of log likelihood
+_FLAT = 0.2  # slope of the log likelihood at which the search ends: 0.2 deviations or less off
+_STEP = 0.01  # of the differences
+_MISSED = 1.92  # of log likelihood: half of the 95 % point of chi-square with one degree
 _NOT_MISSED = 0.1  # several that cost no more may go at once
 _NOTICED = 0.3
+
+
+Choice = NDArray[np.bool_]
 
 
 class Verdict(Enum):
@@ -189,27 +194,26 @@ class _Search:
         self._make, self._config, self._drives = make, config, drives
         self._progress = progress
         self._evaluations = 0
-        self._known: dict[bytes, RangeInnovations] = {}
+        self._known: dict[bytes, Vector] = {}  # log likelihoods of the ranges
         self._names = tuple(names)
         self._defaults = {name: _default(config, name, drives) for name in names}
         self.before = self._run(np.zeros(len(names)))
 
     def result(self) -> Tuning:
         """Return what was found."""
-        size = len(self._names)
-        free = np.array([self._matters(index) for index in range(size)])
-        best = self._maximise(np.zeros(size), free)
-        known = self._deviations(best, free)
+        free, best = self._survey()
+        best = self._maximise(best, free)
+        deviations = self._deviations(best, free)
         while free.any():
-            losses = np.array(
-                [self._loss(best, index) if free[index] else np.inf for index in range(size)]
-            )
-            if losses.min() >= _MISSED:
+            # What would be missed when one goes back and the others make up for it (Wald).
+            missed = np.where(free, 0.5 * (best / self._deviations(best, free)) ** 2, np.inf)
+            back = missed <= max(float(missed.min()), _NOT_MISSED)
+            fewer = free & ~back
+            found = self._maximise(np.where(back, 0.0, best), fewer)
+            if self._objective(best) - self._objective(found) >= _MISSED * int(back.sum()):
                 break
-            back = losses <= max(float(losses.min()), _NOT_MISSED)
-            free[back], best[back] = False, 0.0
-            best = self._maximise(best, free)
-        deviations = np.where(free, self._deviations(best, free), known)
+            free, best = fewer, found
+        deviations = np.where(free, self._deviations(best, free), deviations)
         parameters = []
         for name, own, deviation, tuned in zip(self._names, best, deviations, free, strict=True):
             # The data know it better than the prior: they hold more than half of what is known.
@@ -243,99 +247,94 @@ class _Search:
         return set_parameters(self._config, values), factor
 
     def _run(self, at: Vector) -> RangeInnovations:
+        config, factor = self._settings(at)
+        self._evaluations += 1
+        return run_drives(self._make(config), self._drives, config.huber, config.gate, factor)
+
+    def _each(self, at: Vector) -> Vector:
+        """Return the log likelihood of each range; worked out once for each place."""
         key = at.tobytes()
         if key not in self._known:
-            config, factor = self._settings(at)
-            self._known[key] = run_drives(
-                self._make(config), self._drives, config.huber, config.gate, factor
-            )
-            self._evaluations += 1
-            if self._evaluations > 1:
-                gained = self._known[key].log_likelihood - self.before.log_likelihood
-                self._progress(self._evaluations, gained)
+            found = self._known[key] = self._run(at).log_likelihoods
+            gained = float(found.sum()) - self.before.log_likelihood
+            self._progress(self._evaluations, gained)
         return self._known[key]
 
     def _objective(self, at: Vector) -> float:
-        return self._run(at).log_likelihood - 0.5 * float(np.sum((at / _PRIOR_STD) ** 2))
+        return float(self._each(at).sum() - 0.5 * np.sum((at / _PRIOR_STD) ** 2))
 
-    def _matters(self, index: int) -> bool:
-        """Whether the ranges notice the parameter at all, be it far greater or far smaller."""
-        if self._defaults[self._names[index]] <= 0.0:
-            return False
-        changes = []
-        for way in (-2.0 * _PRIOR_STD, 2.0 * _PRIOR_STD):
-            at = np.zeros(len(self._names))
-            at[index] = way
-            changes.append(self._run(at).log_likelihood - self.before.log_likelihood)
-        return max(abs(change) for change in changes) > _NOTICED
+    def _survey(self) -> tuple[Choice, Vector]:
+        """Return which parameters the ranges notice at all, and a place from where to climb.
 
-    def _loss(self, best: Vector, index: int) -> float:
-        back = best.copy()
-        back[index] = 0.0
-        return self._objective(best) - self._objective(back)
+        Each is tried far smaller and far greater, the others staying at the best so far: from
+        noise so wrong that most ranges are refused, no slope leads anywhere.
+        """
+        size = len(self._names)
+        free, best = np.zeros(size, dtype=bool), np.zeros(size)
+        for index, name in enumerate(self._names):
+            if self._defaults[name] <= 0.0:
+                continue
+            tried = [best]
+            for way in (-2.0, -1.0, 1.0, 2.0):
+                tried.append(best.copy())
+                tried[-1][index] = way * _PRIOR_STD
+            sums = [float(self._each(at).sum()) for at in tried]
+            free[index] = max(sums) - min(sums) > _NOTICED
+            best = max(tried, key=self._objective)
+        return free, best
 
-    def _maximise(self, at: Vector, free: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Vector:
+    def _maximise(self, at: Vector, free: Choice) -> Vector:
         if not free.any():
             return at
 
         def whole(part: Vector) -> Vector:
-            full = at.copy()
+            full: Vector = at.copy()
             full[free] = part
             return full
 
-        def cost(part: Vector) -> tuple[float, Vector]:
-            full = whole(part)
-            slope = np.array([self._slope(full, index) for index in np.flatnonzero(free)])
-            return -self._objective(full), -slope
-
         found = minimize(
-            cost,
+            lambda part: -self._objective(whole(part)),
             at[free],
-            jac=True,
-            method='L-BFGS-B',
-            bounds=[(-_FARTHEST, _FARTHEST)] * int(free.sum()),
-            options={'ftol': 1e-6, 'gtol': 0.1, 'maxiter': 25},
+            jac=lambda part: -self._gradient(whole(part), free)[free],
+            hess=lambda part: self._information(whole(part), free)[np.ix_(free, free)],
+            method='dogleg',
+            options={'gtol': _FLAT, 'maxiter': 12, 'max_trust_radius': 2.0},
         )
-        best = whole(np.asarray(found.x))
+        best: Vector = whole(np.asarray(found.x))
         return best if self._objective(best) >= self._objective(at) else at
 
-    def _slope(self, at: Vector, index: int) -> float:
-        ahead = at.copy()
-        ahead[index] += _STEP
-        back = at.copy()
-        back[index] -= _STEP
-        return (self._objective(ahead) - self._objective(back)) / (2.0 * _STEP)
+    def _gradient(self, at: Vector, free: Choice) -> Vector:
+        return np.asarray(self._slopes(at, free).sum(axis=0) - at / _PRIOR_STD**2)
 
-    def _deviations(
-        self, at: Vector, free: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-    ) -> Vector:
-        """Return the deviations of the logarithms that data and prior leave.
+    def _information(self, at: Vector, free: Choice) -> Matrix:
+        """Return what is known of the logarithms from data and prior, shape (n, n).
 
-        The information is the sum of the outer products of each range's slopes: the slopes of
-        independent innovations are uncorrelated (Berndt, Hall, Hall, Hausman 1974).
+        It is the sum of the outer products of each range's slopes: the slopes of independent
+        innovations are uncorrelated (Berndt, Hall, Hall, Hausman 1974).
         """
-        size = len(at)
-        slopes: Matrix = np.zeros((len(self.before.innovations), size))
-        for index in np.flatnonzero(free):
-            ahead = at.copy()
-            ahead[index] += _STEP
-            back = at.copy()
-            back[index] -= _STEP
-            difference = self._run(ahead).log_likelihoods - self._run(back).log_likelihoods
-            slopes[:, index] = difference / (2.0 * _STEP)
-        information = slopes.T @ slopes + np.eye(size) / _PRIOR_STD**2
+        slopes = self._slopes(at, free)
+        return np.asarray(slopes.T @ slopes + np.eye(len(at)) / _PRIOR_STD**2)
+
+    def _deviations(self, at: Vector, free: Choice) -> Vector:
+        information = self._information(at, free)
         return np.asarray(np.sqrt(np.diagonal(np.linalg.inv(information))))
+
+    def _slopes(self, at: Vector, free: Choice) -> Matrix:
+        """Return d(log likelihood of each range)/d(logarithm), shape (ranges, n)."""
+        slopes: Matrix = np.zeros((len(self.before.innovations), len(at)))
+        for index in np.flatnonzero(free).tolist():
+            step = np.zeros(len(at))
+            step[index] = _STEP
+            slopes[:, index] = (self._each(at + step) - self._each(at - step)) / (2.0 * _STEP)
+        return slopes
 
 
 def _default(config: EstimatorConfig, name: str, drives: Sequence[Drive]) -> float:
     if name == RANGE_STD:
         told = _told(drives)
         return math.sqrt(float(np.median(told))) if told else config.default_range_std
-    value: object = config
-    for part in name.split('.'):
-        value = getattr(value, part)
-    assert isinstance(value, (int, float))
-    return float(value)
+    owner, last = _owner(config, name)
+    return float(getattr(owner, last))
 
 
 def _told(drives: Sequence[Drive]) -> list[float]:
@@ -347,8 +346,14 @@ def _told(drives: Sequence[Drive]) -> list[float]:
 def _unit(config: EstimatorConfig, name: str) -> str:
     if name == RANGE_STD:
         return 'm'
+    owner, last = _owner(config, name)
+    return parameters_of(type(owner))[last][1].unit
+
+
+def _owner(config: EstimatorConfig, name: str) -> tuple[Config, str]:
+    """Return the part of the settings that a dotted name is in, and its name there."""
     owner: Config = config
     *parts, last = name.split('.')
     for part in parts:
         owner = getattr(owner, part)
-    return parameters_of(type(owner))[last][1].unit
+    return owner, last
