@@ -1,4 +1,4 @@
-"""Looking back: what the whole run says of every instant of it (the RTS smoother: Rauch et al. 1965).
+"""Looking back: what the whole run says of each instant (RTS smoother: Rauch et al. 1965).
 
 A filter knows at each time what was measured until then. Going back from the end, the smoother
 corrects each filtered estimate by what was learned after it: with the filtered mean m and
