@@ -13,17 +13,23 @@ import math
 
 import numpy as np
 
-from tablerunner.estimation.estimator import EstimatorConfig, Measurement, Start, no_use
+from tablerunner.estimation.estimator import (
+    EstimatorConfig,
+    Measurement,
+    RangeByRange,
+    Start,
+    no_use,
+)
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Innovation, RangeSample
+from tablerunner.types import Anchor, Estimate, Innovation, PoseSample
 
 STATE_NAMES = ('x', 'y', 'heading')
 
 
-class Kf:
+class Kf(RangeByRange):
     """Kalman filter on odometry and positions."""
 
     name = 'kf'
@@ -31,7 +37,10 @@ class Kf:
     state_names = STATE_NAMES
 
     def __init__(
-        self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
+        self,
+        config: EstimatorConfig,
+        anchors: tuple[Anchor, ...],  # noqa: ARG002 - all estimators are made alike
+        lever_arm: Point3,  # noqa: ARG002
     ) -> None:
         self.config = config
 
@@ -65,7 +74,7 @@ class Kf:
         that a pose may have is left alone. A position far from where odometry has the robot is
         not believed: Sun's check that UWB operates properly (section 2.6).
         """
-        if isinstance(measurement, RangeSample):
+        if not isinstance(measurement, PoseSample):
             return no_use(estimate, measurement, 'kf takes positions only')
         expected, _ = predict_position(estimate.mean, measurement.point)
         innovation = np.array([measurement.pose.x, measurement.pose.y]) - expected

@@ -160,8 +160,8 @@ def run_liu2023(seeds: Sequence[int], progress: Progress) -> Outcome:
             'of the one robot, were chosen to match the raw rows, the same for all seeds.',
             'The largest raw error of the paper, 16.9 m, is a single outlier that these walls do '
             'not make; no bound is set on it.',
-            'The RMSE that the paper prints for UKF and DDF is less than its mean, which no series '
-            'of errors can have: compare mean and maximum.',
+            'The RMSE that the paper prints for UKF and DDF is less than its mean, which no '
+            'series of errors can have: compare mean and maximum.',
             'ukf and ddf know blocked ranges as the paper does, by how they jump (12-13). ekf '
             'knows them by the signal powers (its default), which the simulation makes clearer '
             'than a radio does, and takes the ranges as calibrated; so does ukf.',
@@ -204,7 +204,7 @@ def fused_of(drive: Drive, name: str) -> tuple[NDArray[np.int64], Array]:
         initial_pose_std=(0.05, 0.05, 0.02),
         positioner=PositionerConfig(solver='two_anchor', epoch=0.5),
         filter=EstimatorConfig(
-            range_bias_common_std=0.01, range_bias_std=0.01, range_bias_walk=1e-4
+            range_bias_common_std=0.003, range_bias_std=0.003, range_bias_walk=1e-4
         ),
     )
     nlos_test = 'signal_quality' if name == 'ekf' else PAPER_NLOS_TEST
