@@ -73,7 +73,7 @@ def tune(
             make,
             config.localizer.filter,
             drives,
-            progress=lambda runs, gained: bar.show(runs, max(runs, _LIKELY_RUNS)),
+            progress=lambda runs: bar.show(runs, max(runs, _LIKELY_RUNS)),
         )
     report = TuneReport(found, bag, estimator, time.perf_counter() - begun)
     for line in report.lines():

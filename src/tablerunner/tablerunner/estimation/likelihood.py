@@ -15,21 +15,31 @@ z, which makes the noise that maximises it the true one where nothing is blocked
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Measurement, Start
+from tablerunner.estimation.estimator import Estimator, Measurement, Start
 from tablerunner.estimation.recording import Run
 from tablerunner.estimation.smoother import extend_back, smooth
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import RangeSample, Vector
+from tablerunner.types import HeadingSample, PoseSample, RangeSample, Vector
 
 _START_FACTOR = 3.0
 _LONGEST_MERGED_S = 0.1
+
+
+class DriveStep(NamedTuple):
+    """A motion, then what was measured at its end."""
+
+    stamp: int
+    motion: Motion | None  # since the step before; None: no time has passed
+    ranges: tuple[RangeSample, ...] = ()  # of one instant
+    other: PoseSample | HeadingSample | None = None
 
 
 @dataclass(frozen=True)
@@ -40,12 +50,11 @@ class Drive:
     ----------
     start : Start
         Pose only; range biases begin at their prior.
-    steps : tuple of (int, Motion or None, Measurement or None)
-        Stamp, the motion since the step before (None: no time has passed), what was measured.
+    steps : tuple of DriveStep
     """
 
     start: Start
-    steps: tuple[tuple[int, Motion | None, Measurement | None], ...]
+    steps: tuple[DriveStep, ...]
 
 
 @dataclass(frozen=True)
@@ -106,14 +115,18 @@ def drive_of(run: Run) -> Drive:
 
 def _merged(
     steps: Iterable[tuple[int, Motion | None, Measurement | None]],
-) -> Iterable[tuple[int, Motion | None, Measurement | None]]:
-    """Yield the steps with short motions between two measurements made one: half the work."""
+) -> Iterator[DriveStep]:
+    """Yield the steps with ranges of one instant and short motions before one put together."""
     gathered: Motion | None = None
-    stamp = 0
+    ranges: list[RangeSample] = []
+    last = 0
     for stamp, motion, measurement in steps:
+        if ranges and (motion is not None or not isinstance(measurement, RangeSample)):
+            yield DriveStep(last, gathered, tuple(ranges))
+            gathered, ranges = None, []
         if motion is not None:
             if gathered is not None and gathered.dt_s + motion.dt_s > _LONGEST_MERGED_S:
-                yield stamp - round(motion.dt_s * 1e9), gathered, None
+                yield DriveStep(last, gathered)
                 gathered = None
             before = gathered or Motion(0.0, 0.0, 0.0)
             gathered = Motion(
@@ -121,11 +134,14 @@ def _merged(
                 before.turn_rad + motion.turn_rad,
                 before.dt_s + motion.dt_s,
             )
-        if measurement is not None:
-            yield stamp, gathered, measurement
+        if isinstance(measurement, RangeSample):
+            ranges.append(measurement)
+        elif measurement is not None:
+            yield DriveStep(stamp, gathered, (), measurement)
             gathered = None
-    if gathered is not None:
-        yield stamp, gathered, None
+        last = stamp
+    if ranges or gathered is not None:
+        yield DriveStep(last, gathered, tuple(ranges))
 
 
 def run_drives(
@@ -152,19 +168,21 @@ def run_drives(
     square = range_std_factor**2
     for drive in drives:
         estimate = estimator.start(drive.start)
-        for stamp, motion, measurement in drive.steps:
+        for stamp, motion, ranges, other in drive.steps:
             if motion is not None:
                 estimate = estimator.predict(estimate, motion, stamp)
-            if measurement is None:
+            if other is not None:
+                estimate, _ = estimator.update(estimate, other)
+            if not ranges:
                 continue
-            if square != 1.0 and isinstance(measurement, RangeSample):
-                measurement = replace(measurement, variance_m2=square * measurement.variance_m2)
-            estimate, seen = estimator.update(estimate, measurement)
-            if seen.source == RANGE_SOURCE and seen.considered:
-                anchors.append(seen.key)
-                rows.append(
-                    (float(seen.innovation[0]), float(seen.covariance[0, 0]), seen.accepted)
-                )
+            samples: Sequence[RangeSample] = ranges
+            if square != 1.0:
+                samples = [replace(item, variance_m2=square * item.variance_m2) for item in ranges]
+            estimate, found = estimator.update_ranges(estimate, samples)
+            for seen in found:
+                if seen.considered:
+                    anchors.append(seen.key)
+                    rows.append((seen.innovation.item(), seen.covariance.item(), seen.accepted))
     table = np.array(rows, dtype=float).reshape(-1, 3)
     innovations, variances = table[:, 0], table[:, 1]
     loss = robust_loss(innovations / np.sqrt(variances), huber, gate)

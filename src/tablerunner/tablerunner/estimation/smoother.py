@@ -30,6 +30,7 @@ SMOOTHED = ('ekf', 'ukf', 'dead_reckoning')
 
 _HEADING = 2  # of every estimator: the only angle of a state
 _STEP = 1e-5  # of the differences: units are m, rad, and fractions of 1
+_CERTAIN = 1e-10  # deviation, in any unit here, that only rounding makes
 _NOTHING = 1e-12  # eigenvalue of a correlation matrix that counts as none
 
 
@@ -142,7 +143,7 @@ def inverse_of_covariance(covariance: Matrix) -> Matrix:
     to a deviation of 1 first, so that small ones do not count as nothing beside large ones.
     """
     deviation = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    scale = np.divide(1.0, deviation, out=np.zeros_like(deviation), where=deviation > 0.0)
+    scale = np.divide(1.0, deviation, out=np.zeros_like(deviation), where=deviation > _CERTAIN)
     values, vectors = np.linalg.eigh(covariance * scale[:, None] * scale)
     kept = values > _NOTHING * max(float(values[-1]), 0.0)
     root = vectors[:, kept] / np.sqrt(values[kept]) * scale[:, None]

@@ -78,11 +78,11 @@ def test_recording_keeps_the_run_that_the_filter_ended_with(room):
     assert stamps == sorted(stamps)
     assert taken == sum(step.measurement is not None for step in run.steps) > 300
     estimate = run.first
-    for step in run.steps:
+    for step in run.steps:  # no two ranges of this drive are of one instant
         if step.motion is not None:
             estimate = run.estimator.predict(estimate, step.motion, step.stamp)
         if step.measurement is not None:
-            estimate, _ = run.estimator.update(estimate, step.measurement)
+            estimate, _ = run.estimator.update_ranges(estimate, [step.measurement])
         assert estimate.mean.tobytes() == step.after.mean.tobytes()
         newest[step.stamp] = estimate
     final = recording.estimate

@@ -13,6 +13,7 @@ from tablerunner.estimation import EstimatorConfig, LocalizerConfig, Start
 from tablerunner.estimation.ekf import Ekf, bias_covariance
 from tablerunner.estimation.likelihood import (
     Drive,
+    DriveStep,
     drive_of,
     robust_loss,
     run_drives,
@@ -25,7 +26,11 @@ from tablerunner.odometry.motion import Motion, MotionNoise, advance
 from tablerunner.types import OdometrySample, RangeSample
 
 TRUE = EstimatorConfig(
-    motion=MotionNoise(0.08, 0.08, 0.005, 0.001), range_bias_walk=1e-3, default_range_std=0.08
+    motion=MotionNoise(0.08, 0.08, 0.005, 0.001),
+    range_bias_walk=1e-3,
+    default_range_std=0.08,
+    turn_scale_std=0.0,
+    range_delay_std=0.0,
 )
 WRONG = 3.0
 
@@ -50,6 +55,7 @@ def drawn(room, seed, steps=240, told=0.0, blocked=0.0):
         true = advance(true, real)
         biases += rng.normal(0, TRUE.range_bias_walk * math.sqrt(motion.dt_s), 4)
         stamp = 1 + k * 100_000_000
+        ranges = []
         for turn_of in (0, 1):
             anchor = room.anchors[(2 * k + turn_of) % 4]
             tag = true.transform(np.array(room.lever[:2]))
@@ -58,7 +64,8 @@ def drawn(room, seed, steps=240, told=0.0, blocked=0.0):
             if rng.random() < blocked:
                 measured += rng.uniform(0.5, 3.0)
             sample = RangeSample(stamp, anchor.anchor_id, 'tag', k, measured, told**2)
-            taken.append((stamp, motion if turn_of == 0 else None, sample))
+            ranges.append(sample)
+        taken.append(DriveStep(stamp, motion, tuple(ranges)))
     return Drive(Start(1, mean, np.diag(prior**2)), tuple(taken))
 
 
@@ -216,7 +223,7 @@ def test_drive_of_a_run_that_found_its_start_takes_the_window_too(room):
             localizer.add_range(sample)
     (run,) = localizer.runs()
     taken = drive_of(run)
-    ranges = [sample for _, _, sample in taken.steps if sample is not None]
+    ranges = [sample for step in taken.steps for sample in step.ranges]
     first = drive.odometry[0].stamp
     expected = [sample for sample in drive.ranges if sample.stamp >= first]
     # The range that settled the start was ahead of the odometry that the start is placed at.
@@ -225,7 +232,7 @@ def test_drive_of_a_run_that_found_its_start_takes_the_window_too(room):
     assert taken.start.stamp == first
     true = drive.truth[first]
     assert np.hypot(taken.start.pose[0] - true.x, taken.start.pose[1] - true.y) < 0.3
-    driven = sum(motion.dt_s for _, motion, _ in taken.steps if motion is not None)
+    driven = sum(step.motion.dt_s for step in taken.steps if step.motion is not None)
     assert driven == pytest.approx((drive.odometry[-1].stamp - first) * 1e-9)
     config = EstimatorConfig()
     seen = run_drives(make(room, config), [taken], config.huber, config.gate)
