@@ -61,6 +61,9 @@ from tablerunner.types import (
     Vector,
 )
 
+LONG, SHORT = 'long for a while', 'short for a while'
+"""Why a range was taken as it was: its anchor's mean innovation is no chance."""
+
 _CLIP = 4.0
 """One wild reading does not make an anchor's mean [standard deviations]."""
 
@@ -104,6 +107,7 @@ class Ekf:
         self._anchors = {anchor.anchor_id: (i, anchor) for i, anchor in enumerate(anchors)}
         self._size = RANGE_BIAS + len(anchors)
         self._calm = (0.0,) * len(anchors)
+        self._usual_bias = math.hypot(config.range_bias_common_std, config.range_bias_std)
         walk = np.zeros(self._size)
         walk[GYRO_BIAS] = config.gyro_bias_walk**2
         walk[RANGE_DELAY] = config.range_delay_walk**2
@@ -270,6 +274,10 @@ class Ekf:
         deviations = innovation / math.sqrt(spread)
         memory = list(estimate.memory)
         persistent = memory[index]
+        if persistent < -config.doubt and estimate.mean[RANGE_BIAS + index] > self._usual_bias:
+            # What has been learned of this anchor was something in the way, which is gone.
+            estimate = self._forget_bias(estimate, index)
+            return self._update_range(estimate, sample)
         clipped = min(max(deviations, -_CLIP), _CLIP)
         memory[index] = persistent = persistent + config.persistence_share * (clipped - persistent)
         nis = deviations * deviations
@@ -281,9 +289,11 @@ class Ekf:
                 weighed = spread * abs(deviations) / config.huber
                 reason = 'weight reduced'
             if deviations > 0.0 and persistent > config.persistence:
-                # Long for a while: so many readings share one error, and tell as little as one.
+                # So many readings share one error, and tell as little as one.
                 weighed += spread * persistent * persistent * config.persistence_count
-                reason = 'long for a while'
+                reason = LONG
+            elif persistent < -config.doubt:
+                reason = SHORT
             mean = estimate.mean + cross * (innovation / weighed)
             if not -math.pi < mean[HEADING] <= math.pi:
                 mean[HEADING] = wrap(float(mean[HEADING]))
@@ -303,6 +313,20 @@ class Ekf:
             nis,
             config.gate,
         )
+
+    def _forget_bias(self, estimate: Estimate, index: int) -> Estimate:
+        """Return the estimate with one anchor's range bias back at its prior."""
+        row, mean, covariance = (
+            RANGE_BIAS + index,
+            estimate.mean.copy(),
+            estimate.covariance.copy(),
+        )
+        mean[row] = 0.0
+        covariance[row] = covariance[:, row] = 0.0
+        covariance[row, row] = self._usual_bias**2
+        memory = list(estimate.memory)
+        memory[index] = 0.0
+        return replace(estimate, mean=mean, covariance=covariance, memory=tuple(memory))
 
     def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> Expected:
         """Return what an anchor should read, linearised at the mean.

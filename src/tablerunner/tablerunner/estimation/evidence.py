@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 
+from tablerunner.estimation.ekf import SHORT
 from tablerunner.estimation.estimator import RANGE_SOURCE
 from tablerunner.types import Innovation
+
+_PAUSE_NS = 1_500_000_000
+"""A doubt that comes back within this time has never ended."""
 
 _FEWEST = 12
 """Innovations that a mean is made of, at least."""
@@ -29,6 +33,7 @@ class Evidence:
         self._recent: deque[tuple[int, float]] = deque()
         self._total = 0.0
         self._accepted = 0
+        self._doubted = (0, 0)  # first and last stamp of a doubt that goes on
         self.refused_for = 0
 
     @property
@@ -36,12 +41,20 @@ class Evidence:
         """Mean over the window; about 0.75 for a filter that is right, 0 while there are few."""
         return self._total / len(self._recent) if len(self._recent) >= _FEWEST else 0.0
 
+    @property
+    def doubted_for(self) -> int:
+        """Time over which ranges have been short again and again [ns]."""
+        return self._doubted[1] - self._doubted[0]
+
     def add(self, innovation: Innovation, window: int) -> None:
         """Take an innovation; forget those that are older than the window [ns]."""
         stamp = innovation.stamp
         if innovation.accepted or not self._accepted:
             self._accepted = max(self._accepted, stamp)
         self.refused_for = stamp - self._accepted
+        if innovation.reason == SHORT:
+            first, last = self._doubted
+            self._doubted = (first if stamp - last < _PAUSE_NS else stamp, stamp)
         weight = _weight(innovation)
         self._recent.append((stamp, weight))
         self._total += weight

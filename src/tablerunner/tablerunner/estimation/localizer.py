@@ -335,8 +335,11 @@ class Localizer:
         if innovation.accepted:
             self._accepted_stamp = max(self._accepted_stamp, innovation.stamp)
         self._evidence.add(innovation, nanoseconds(self.config.lost_window))
-        if self._evidence.mean > self.config.lost_nis or self._evidence.refused_for > nanoseconds(
-            self.config.lost_silence
+        evidence, config = self._evidence, self.config
+        if (
+            evidence.mean > config.lost_nis
+            or evidence.refused_for > nanoseconds(config.lost_silence)
+            or evidence.doubted_for > nanoseconds(config.lost_doubt)
         ):
             self._timeline = None
             self._lost = True

@@ -88,6 +88,14 @@ class LocalizerConfig(Config):
         high=3600.0,
         dynamic=True,
     )
+    lost_doubt: float = parameter(
+        8.0,
+        unit='s',
+        description='Time over which ranges are short again and again until it counts as lost',
+        above=0.0,
+        high=3600.0,
+        dynamic=True,
+    )
     filter: EstimatorConfig = parameter(factory=EstimatorConfig, description='Noise and gates')
     positioner: PositionerConfig = parameter(
         factory=_patient_positioner,
