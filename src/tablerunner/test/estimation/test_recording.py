@@ -63,6 +63,9 @@ def test_recording_changes_nothing(room, name):
     if name != 'kf':  # it gathers ranges before it looks at how late they are
         assert refused > 20
     assert len(recording.runs()) >= 2  # the pose given was wrong: some notice and begin anew
+    # No farther back than the history: what lies before belongs to the first run.
+    second = recording.runs()[1]
+    assert second.start.stamp - second.lead_in[0].stamp < 700_000_000
 
 
 def test_recording_keeps_the_run_that_the_filter_ended_with(room):
