@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from tablerunner.cli.calibrate import calibrate_app
+from tablerunner.cli.compare import compare
 from tablerunner.cli.convert import convert_app
 from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
 from tablerunner.cli.info import info
@@ -37,6 +38,7 @@ def make_app() -> typer.Typer:
     app.command()(info)
     app.command()(plot)
     app.command()(reproduce)
+    app.command()(compare)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')
     for entry in sorted(entry_points(group=GROUP), key=lambda item: item.name):
