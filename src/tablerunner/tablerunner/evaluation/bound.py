@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablerunner.estimation.models.motion_model import move, transport
-from tablerunner.estimation.models.range_model import Point3, predict_range
+from tablerunner.estimation.models.motion_model import input_noise, move, transport
+from tablerunner.estimation.models.range_model import STANDING, Point3, Twist, predict_range
 from tablerunner.estimation.models.state import RANGE_BIAS
 from tablerunner.evaluation.truth import Stamps, Truth
 from tablerunner.geometry.pose import Pose2
@@ -96,7 +96,7 @@ def posterior_bound(
     positions, headings = truth.at(stamps)
     bounds = np.empty((len(truth), 3, 3))
     covariance, row = np.array(model.prior, dtype=float), 0
-    state = np.zeros(model.size)
+    state, twist = np.zeros(model.size), STANDING
     before: tuple[int, Pose2] | None = None
     for stamp, anchor, (x, y), heading in zip(stamps, which, positions, headings, strict=True):
         if not np.isfinite(heading):
@@ -106,26 +106,29 @@ def posterior_bound(
             step = between_poses(before[1], pose, seconds(int(stamp) - before[0]))
             state[:3] = before[1].x, before[1].y, before[1].heading
             covariance = _moved(model, covariance, state, step)
+            twist = step.distance_m / step.dt_s, step.turn_rad / step.dt_s
         before = int(stamp), pose
         if anchor < 0:
             bounds[row] = covariance[:3, :3]
             row += 1
         else:
             state[:3] = pose.x, pose.y, pose.heading
-            covariance = _ranged(model, covariance, state, int(anchor))
+            covariance = _ranged(model, covariance, state, int(anchor), twist)
     return bounds
 
 
 def _moved(model: BoundModel, covariance: Matrix, state: Vector, motion: Motion) -> Matrix:
-    _, coupling, by_input = move(state, motion)
-    noise = (by_input * model.motion.variances(motion)) @ by_input.T
-    moved = transport(covariance, coupling, noise)
-    moved.reshape(-1)[:: model.size + 1] += model.walk_per_time * motion.dt_s
-    return moved
+    _, by_state, by_input = move(state, motion)
+    noise: Matrix = np.diag(model.walk_per_time * motion.dt_s)
+    input_noise(noise, by_input, *model.motion.variances(motion))
+    return transport(covariance, by_state, noise)
 
 
-def _ranged(model: BoundModel, covariance: Matrix, state: Vector, anchor: int) -> Matrix:
-    distance, slope = predict_range(state, model.anchors[anchor], model.lever_arm, anchor)
+def _ranged(
+    model: BoundModel, covariance: Matrix, state: Vector, anchor: int, twist: Twist
+) -> Matrix:
+    place = model.anchors[anchor]
+    distance, slope = predict_range(state, place, model.lever_arm, anchor, twist)
     slope[RANGE_BIAS + len(model.anchors) + anchor] = distance
     cross = covariance @ slope
     corrected: Matrix = covariance - np.outer(

@@ -14,6 +14,7 @@ estimator's own and not a wrong guess of noise. The simulation draws its errors 
 | noise of ranges, ticks of the timestamps | `RangerConfig.range_std` |
 | constant error of each anchor | `range_bias_std` |
 | error in proportion to the range | more `range_bias_std`, and `range_bias_walk` as it changes |
+| none: all stamps are exact | `range_delay_std` is zero |
 | powers in and out of sight | `nlos_gap_centre`, `nlos_gap_width` |
 """
 
@@ -27,7 +28,13 @@ import numpy as np
 from tablerunner.bags.replay_config import ReplayConfig
 from tablerunner.estimation.ekf import bias_covariance
 from tablerunner.estimation.estimator import EstimatorConfig
-from tablerunner.estimation.models.state import GYRO_BIAS, RANGE_BIAS, SCALE
+from tablerunner.estimation.models.state import (
+    GYRO_BIAS,
+    RANGE_BIAS,
+    RANGE_DELAY,
+    SCALE,
+    TURN_SCALE,
+)
 from tablerunner.evaluation.bound import BoundModel
 from tablerunner.odometry.motion import MotionNoise
 from tablerunner.scenario import Scenario, SensorErrors
@@ -155,8 +162,12 @@ def estimator_config(
         motion=noise,
         scale_std=math.hypot(wheels.radius_scale_std / math.sqrt(2.0), lost),
         scale_walk=0.0,
+        turn_scale_std=imu.gyro_scale_std,
+        turn_scale_walk=0.0,
         gyro_bias_std=imu.gyro_bias_std,
         gyro_bias_walk=imu.gyro_bias_walk,
+        range_delay_std=0.0,
+        range_delay_walk=0.0,
         range_bias_common_std=0.0,
         range_bias_std=math.hypot(uwb.bias_std, uwb.scale_std * _far(scenario, way)),
         range_bias_walk=changed,
@@ -179,6 +190,8 @@ def bound_model(scenario: Scenario, way: Way, start_std: tuple[float, ...]) -> B
     prior: Matrix = np.zeros((RANGE_BIAS + 2 * count,) * 2)
     prior[:3, :3] = np.diag(np.square(start_std))
     prior[SCALE, SCALE] = config.scale_std**2
+    prior[TURN_SCALE, TURN_SCALE] = config.turn_scale_std**2
+    prior[RANGE_DELAY, RANGE_DELAY] = config.range_delay_std**2
     prior[GYRO_BIAS, GYRO_BIAS] = config.gyro_bias_std**2
     biases = slice(RANGE_BIAS, RANGE_BIAS + count)
     uwb = scenario.sensors.uwb
