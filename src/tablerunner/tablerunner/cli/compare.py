@@ -61,6 +61,7 @@ def compare(
     """
     from rich.console import Console
 
+    from tablerunner.bags.replay_config import ReplayConfig
     from tablerunner.cli.bar import Bar
     from tablerunner.cli.csv_file import write_csv
     from tablerunner.cli.json_file import write_json
@@ -72,9 +73,9 @@ def compare(
     room = load_scenario(find_scenario_file(scenario))
     points = find_route(room, route)
     names = tuple(name.strip() for name in estimators.split(',') if name.strip())
-    setup = Setup(
-        room if nlos else clear_of(room), points, names or tuple(ESTIMATORS), speed, not defaults
-    )
+    room = room if nlos else clear_of(room)
+    config = ReplayConfig.from_scenario(room) if defaults else None
+    setup = Setup(room, points, names or tuple(ESTIMATORS), speed, config)
     with Bar(f'compare on {room.name}') as bar:
         runs = run_compare(setup, range(first_seed, first_seed + seeds), bar.show, workers)
     comparison = compared(setup, runs)

@@ -44,15 +44,15 @@ class Setup:
     estimators : tuple of str
     speed : float
         [m/s].
-    fitted : bool
-        Whether noise and priors are matched to the scenario (`matched`) or those shipped.
+    config : ReplayConfig or None
+        Settings of all that estimates; None: matched to the sensors of the scenario (`matched`).
     """
 
     scenario: Scenario
     route: Route
     estimators: tuple[str, ...]
     speed: float = 0.5
-    fitted: bool = True
+    config: ReplayConfig | None = None
 
     def __post_init__(self) -> None:
         """Refuse what there is not."""
@@ -61,6 +61,9 @@ class Setup:
         for name in self.estimators:
             if name not in ESTIMATORS:
                 raise ConfigError('--estimators', name, 'one of ' + ', '.join(ESTIMATORS))
+        if not 0.0 < self.speed <= self.scenario.robot.limits.speed:
+            fastest = f'more than 0, at most {self.scenario.robot.limits.speed} m/s'
+            raise ConfigError('--speed', self.speed, fastest)
 
     @property
     def way(self) -> Way:
@@ -69,11 +72,9 @@ class Setup:
         return Way(((start.x, start.y), *self.route), self.speed)
 
     @property
-    def config(self) -> ReplayConfig:
+    def settings(self) -> ReplayConfig:
         """Settings of everything that estimates."""
-        if self.fitted:
-            return matched(self.scenario, self.way)
-        return ReplayConfig.from_scenario(self.scenario)
+        return self.config or matched(self.scenario, self.way)
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,7 @@ def one_seed(seed: int, setup: Setup) -> Seed:
     exchanges = [item for item in drive.samples if isinstance(item, RangeTruth)]
     begin = int(drive.stamps[0])
     range_stamps = np.array([item.stamp for item in exchanges], dtype=np.int64)
-    config = setup.config
+    config = setup.settings
     sensed = sense(drive, config.ranger, config.odometer)
     start = drive.poses[0] + stream(seed, 'compare start').standard_normal(3) * START_STD
     runs = {}
