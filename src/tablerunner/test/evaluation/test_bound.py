@@ -112,7 +112,18 @@ def test_ranges_outside_of_the_truth_are_left_out():
     model = model_of(SQUARE, {X: 0.04, Y: 0.04})
     outside = np.array([truth.stamps[0] - 1, truth.stamps[-1] + 1])
     bounds = posterior_bound(model, truth, outside, [0, 1])
-    np.testing.assert_array_equal(bounds[-1], bounds[0])
+    np.testing.assert_allclose(bounds[-1], np.diag([0.04, 0.04, 0.0]))
+
+
+def test_states_that_walk_lose_certainty_with_time():
+    """A gyroscope whose bias walks by w: the heading's variance grows to w^2 t^3 / 3."""
+    walk = np.zeros(RANGE_BIAS)
+    walk[GYRO_BIAS] = 1e-4**2
+    model = model_of((), {}, walk_per_time=walk)
+    truth = truth_of([Pose2(0.05 * k) for k in range(1001)])
+    last = posterior_bound(model, truth, np.empty(0, dtype=np.int64), [])[-1]
+    # In steps of 0.1 s the sum is less than the integral by 1.5 steps of 1000.
+    assert last[HEADING, HEADING] == pytest.approx(1e-8 * 100.0**3 / 3.0, rel=0.003)
 
 
 CONFIG = EstimatorConfig(huber=100.0, gate=1e6, persistence=4.0, range_delay_std=0.0)
