@@ -7,6 +7,7 @@ estimator's own and not a wrong guess of noise. The simulation draws its errors 
 | error of the simulation | setting |
 |---|---|
 | noise of the floor, slip, encoder ticks | `MotionNoise.distance`, per root metre |
+| the same, and noise of the yaw rate | `SlipConfig.rate`, where the shipped one is too small |
 | radii of the wheels | `scale_std` (mean of two wheels) |
 | noise of the yaw rate | `MotionNoise.heading_per_time` |
 | scale of the gyroscope | `turn_scale_std` |
@@ -44,6 +45,9 @@ from tablerunner.uwb.ranging import SPEED_OF_LIGHT_M_S, TICK_S
 
 BLOCKED_SHARE = 0.1
 """How many ranges are taken to be blocked before anything is known of them."""
+
+_SELDOM = 4.5
+"""Deviations beyond which noise hardly ever is."""
 
 _RANGE_WEIGHTS = (0.25, 0.5, 0.25)
 """What each of the three receptions of an exchange weighs in its range."""
@@ -84,7 +88,14 @@ def matched(scenario: Scenario, way: Way) -> ReplayConfig:
     return replace(
         config,
         ranger=ranging,
-        odometer=replace(config.odometer, noise=noise),
+        odometer=replace(
+            config.odometer,
+            noise=noise,
+            slip=replace(
+                config.odometer.slip,
+                rate=max(config.odometer.slip.rate, slip_rate(scenario, way.speed)),
+            ),
+        ),
         localizer=replace(
             config.localizer,
             filter=estimator_config(config.localizer.filter, scenario, way, noise),
@@ -119,6 +130,25 @@ def motion_noise(scenario: Scenario, speed: float) -> MotionNoise:
         heading_per_distance=0.0,
         heading_per_time=imu.gyro_std / math.sqrt(imu.rate),
     )
+
+
+def slip_rate(scenario: Scenario, speed: float) -> float:
+    """Return what the turn rates of wheels and gyroscope differ by without any slip [rad/s].
+
+    `_SELDOM` deviations of the noise of the floor under both wheels, of a tick at both ends of a
+    step, and of the readings of the gyroscope in it, the one at its end held.
+    """
+    wheels, imu = scenario.sensors.wheels, scenario.sensors.imu
+    track, step_s = scenario.robot.track, 1.0 / wheels.rate
+    floor = 2.0 * wheels.floor_noise**2 * speed * step_s
+    ticks = 0.0
+    if wheels.ticks_per_turn:
+        tick = 2.0 * math.pi * scenario.robot.wheel_radius / wheels.ticks_per_turn
+        ticks = 4.0 * tick**2 / 12.0
+    turned = (floor + ticks) / (track * step_s) ** 2
+    held = 1.0 / (imu.rate * step_s)
+    read = imu.gyro_std**2 * (held + held**2)
+    return _SELDOM * math.sqrt(turned + read)
 
 
 def range_std(errors: SensorErrors) -> float:

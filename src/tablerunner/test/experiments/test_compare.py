@@ -70,7 +70,8 @@ def test_matched_ekf_is_consistent_and_near_the_bound(right):
     assert 0.9 < ekf.heading_rmse / right.bound_heading_rmse < 1.1
     assert ekf.average_nees.inside > 0.9
     assert ekf.average_nis.inside > 0.92
-    assert ekf.believed_rmse == pytest.approx(right.bound_rmse, rel=0.03)
+    # Safeguards (Huber, doubt) cost the filter a little where there is nothing to guard against.
+    assert 0.99 < ekf.believed_rmse / right.bound_rmse < 1.15
 
 
 @pytest.mark.parametrize(('factor', 'sign'), [(0.5, 1.0), (2.0, -1.0)])

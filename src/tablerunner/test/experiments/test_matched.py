@@ -16,6 +16,7 @@ from tablerunner.experiments.matched import (
     motion_noise,
     nlos_gap,
     range_std,
+    slip_rate,
 )
 from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry.motion import Motion
@@ -67,6 +68,28 @@ def test_noise_of_the_heading_is_that_of_summed_readings():
     noise = motion_noise(of(imu=ImuErrors(rate=100.0, gyro_std=0.005)), 0.5)
     variance = noise.variances(Motion(0.5, 0.3, 1.0))[1]
     assert math.sqrt(variance) == pytest.approx(0.0005)
+
+
+def test_slip_is_beyond_what_the_noise_of_drawn_drives_explains():
+    """Turn of the robot whose wheels go straight on, in steps of 0.05 s, without slips."""
+    wheels = WheelErrors(
+        rate=20.0,
+        radius_scale_std=0.0,
+        track_scale_std=0.0,
+        slip_rate=0.0,
+        floor_noise=0.01,
+        ticks_per_turn=0,
+    )
+    drive = Drive(RobotGeometry(), wheels, Pose2(), np.random.default_rng(3))
+    apart = []
+    for step in range(2000):
+        drive.command(step * 10_000_000, Velocity(0.5, 0.0))
+        drive.step((step + 1) * 10_000_000, 0.01)
+        apart.append(drive.angular_rad_s * 0.01)  # the wheels are told to go straight on
+    rates = np.sum(np.reshape(apart, (-1, 5)), axis=1) / 0.05
+    believed = slip_rate(of(wheels=wheels, imu=ImuErrors(gyro_std=0.0)), 0.5) / 4.5
+    # 400 steps, the first few slower: the deviation is known to 4 %.
+    assert np.std(rates) == pytest.approx(believed, rel=0.12)
 
 
 def test_ideal_sensors_leave_no_noise_but_the_rounding_of_timestamps():
