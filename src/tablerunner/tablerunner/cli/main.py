@@ -18,6 +18,7 @@ from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
 from tablerunner.cli.reproduce import reproduce
+from tablerunner.cli.tune import tune
 from tablerunner.errors import BagError, ConfigError, TablerunnerError
 
 GROUP = 'tablerunner.commands'
@@ -38,6 +39,7 @@ def make_app() -> typer.Typer:
     app.command()(replay)
     app.command()(info)
     app.command()(plot)
+    app.command()(tune)
     app.command()(reproduce)
     app.command()(compare)
     app.command()(explain_rule)
