@@ -46,7 +46,7 @@ def truth_of(poses):
     return Truth.from_poses((stamp, pose, True) for stamp, pose in zip(stamps, poses, strict=True))
 
 
-def test_standing_robot_is_known_by_the_sum_of_informations():
+def test_standing_robot_is_known_by_all_information_together():
     """Far anchors make ranges linear: P^-1 = P0^-1 + n u u' / r^2, worked out by NumPy."""
     anchors = ((3000.0, 4000.0, 0.0), (-4000.0, 0.0, 0.0))
     truth = truth_of([Pose2()] * 6)
