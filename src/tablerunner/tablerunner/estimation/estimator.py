@@ -215,7 +215,7 @@ class EstimatorConfig(Config):
         dynamic=True,
     )
     range_scale_std: float = parameter(
-        0.01,
+        0.005,
         description="Prior deviation of each anchor's range error in proportion to the distance",
         low=0.0,
         high=0.2,
