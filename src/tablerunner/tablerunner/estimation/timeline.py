@@ -8,11 +8,13 @@ depend on the order of arrival: late data in place equal on-time data, to the la
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from tablerunner.estimation.estimator import Estimator, Measurement, Start
 from tablerunner.estimation.track import OdometryTrack
-from tablerunner.types import Estimate, Innovation, OdometrySample, RangeSample
+from tablerunner.types import Estimate, Innovation, Matrix, OdometrySample, RangeSample
 
 _Key = tuple[int, int, str]  # stamp, rank, source key: a total order, whatever arrives first
 
@@ -21,6 +23,8 @@ _Key = tuple[int, int, str]  # stamp, rank, source key: a total order, whatever 
 class _Entry:
     key: _Key
     measurement: Measurement | None  # None: an odometry sample, prediction only
+    withheld: bool = False  # only judged, the estimate stays
+    widening: Matrix | None = None  # added to the covariance of x and y
     after: Estimate = field(init=False)
 
 
@@ -76,16 +80,23 @@ class Timeline:
         self._run(bisect_right(self._keys, (since, 99, '')))
         self._trim()
 
-    def add(self, measurement: Measurement) -> Innovation | None:
-        """Add a measurement; return what it did, None if the same one is already there."""
+    def add(self, measurement: Measurement, *, withhold: bool = False) -> Innovation | None:
+        """Add a measurement; return what it did, None if the same one is already there.
+
+        With `withhold` the estimate stays: the innovation says what it would have done.
+        """
         key = _key(measurement)
         position = bisect_left(self._keys, key)
         if position < len(self._keys) and self._keys[position] == key:
             return None
-        index = self._insert(_Entry(key, measurement))
+        index = self._insert(_Entry(key, measurement, withhold))
         innovation = self._run(index)
         self._trim()
         return innovation
+
+    def widen(self, covariance: Matrix) -> None:
+        """Add to the covariance of x and y, shape (2, 2), at the newest stamp."""
+        self._run(self._insert(_Entry((self._keys[-1][0], 3, ''), None, False, covariance)))
 
     def _insert(self, entry: _Entry) -> int:
         index = bisect_right(self._keys, entry.key)
@@ -104,7 +115,12 @@ class Timeline:
                 estimate = self.estimator.predict(estimate, motion, stamp)
             innovation = None
             if entry.measurement is not None:
-                estimate, innovation = self.estimator.update(estimate, entry.measurement)
+                after, innovation = self.estimator.update(estimate, entry.measurement)
+                estimate = estimate if entry.withheld else after
+            elif entry.widening is not None:
+                wider = np.array(estimate.covariance)
+                wider[:2, :2] += entry.widening
+                estimate = replace(estimate, covariance=wider)
             entry.after = estimate
             if position == index:
                 first = innovation
