@@ -77,7 +77,7 @@ class UwbHealthConfig(Config):
         dynamic=True,
     )
     disagreement_deviations: float = parameter(
-        5.0,
+        4.0,
         description='They must also differ by so many standard deviations',
         above=0.0,
         high=1e6,
