@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tablerunner.errors import CovarianceError
-from tablerunner.estimation.checks import check_pose, check_range
+from tablerunner.estimation.checks import check_odometry, check_pose, check_range
 from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
 from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
@@ -19,6 +19,7 @@ from tablerunner.estimation.status import Cause, LocalizerState, LocalizerStatus
 from tablerunner.estimation.timeline import Timeline
 from tablerunner.estimation.track import OdometryTrack, plausible
 from tablerunner.estimation.uwb_health import UwbHealth
+from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
 from tablerunner.stream import Order, StampOrder
 from tablerunner.types import (
@@ -193,14 +194,10 @@ class Localizer:
 
     def add_odometry(self, sample: OdometrySample) -> Outcome:
         """Take odometry; the estimate moves on to its stamp."""
-        order = self._order.judge(sample.stamp)
-        if order is Order.ZERO or not (
-            sample.pose.is_finite
-            and math.isfinite(sample.linear_m_s)
-            and math.isfinite(sample.angular_rad_s)
-        ):
-            reason = 'zero stamp' if order is Order.ZERO else 'not finite'
+        reason = check_odometry(sample, self.config.max_speed, self.config.max_turn_rate)
+        if reason:
             return _refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
+        order = self._order.judge(sample.stamp)
         restarted: tuple[Refusal, ...] = ()
         if order is Order.RESTARTED:
             self._clear()
@@ -215,9 +212,9 @@ class Localizer:
         self._track.add(sample)
         self._track.trim(sample.stamp - nanoseconds(self.config.alignment.window))
         if self._pending is not None and self._anchors:
+            # Given before there was odometry: it holds for the first, whenever that may be.
             pending, self._pending = self._pending, None
-            stamp = pending.stamp or sample.stamp
-            self._begin(Start(stamp, _vector(pending.pose), pending.covariance))
+            self._begin(Start(sample.stamp, _vector(pending.pose), pending.covariance))
             return Outcome(self.estimate, (), restarted)
         return Outcome(None, (), restarted)
 
@@ -279,11 +276,11 @@ class Localizer:
         if not reason and sample.stamp < self._track.oldest_stamp:
             reason = 'older than the history'
         if reason:
-            return _refused(sample.stamp, INITIAL_POSE_SOURCE, '', reason)
+            return _refused(sample.stamp, sample.source, '', reason)
         try:
             self._begin(Start(sample.stamp, _vector(sample.pose), sample.covariance))
         except CovarianceError as error:
-            return _refused(sample.stamp, INITIAL_POSE_SOURCE, '', str(error))
+            return _refused(sample.stamp, sample.source, '', str(error))
         return Outcome(self.estimate)
 
     # -- inside -----------------------------------------------------------------------------------
@@ -386,7 +383,7 @@ def _initial_pose(config: LocalizerConfig) -> PoseSample | None:
 
 
 def _vector(pose: Pose2) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    return np.array([pose.x, pose.y, pose.heading])
+    return np.array([pose.x, pose.y, wrap(pose.heading)])
 
 
 def _refused(stamp: int, source: str, key: str, reason: str) -> Outcome:
