@@ -17,6 +17,7 @@ from tablerunner.estimation.estimator import (
     RANGE_SOURCE,
     EstimatorConfig,
     Measurement,
+    RangeByRange,
     Start,
 )
 from tablerunner.estimation.models.position_model import predict_position
@@ -30,7 +31,7 @@ _STILL_M_S = 1.0  # deviation of each velocity at the start: any speed of a robo
 _NEAREST_M = 1e-6
 
 
-class EkfCv:
+class EkfCv(RangeByRange):
     """Extended Kalman filter with constant velocity on ranges and positions."""
 
     name = 'ekf_cv'

@@ -13,7 +13,13 @@ import math
 
 import numpy as np
 
-from tablerunner.estimation.estimator import EstimatorConfig, Measurement, Start, no_use
+from tablerunner.estimation.estimator import (
+    EstimatorConfig,
+    Measurement,
+    RangeByRange,
+    Start,
+    no_use,
+)
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.geometry.angles import wrap
@@ -23,7 +29,7 @@ from tablerunner.types import Anchor, Estimate, Innovation, RangeSample
 STATE_NAMES = ('x', 'y', 'heading')
 
 
-class Kf:
+class Kf(RangeByRange):
     """Kalman filter on odometry and positions."""
 
     name = 'kf'
@@ -31,7 +37,10 @@ class Kf:
     state_names = STATE_NAMES
 
     def __init__(
-        self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
+        self,
+        config: EstimatorConfig,
+        anchors: tuple[Anchor, ...],  # noqa: ARG002 - all estimators are made alike
+        lever_arm: Point3,  # noqa: ARG002
     ) -> None:
         self.config = config
 

@@ -226,9 +226,7 @@ class Localizer:
             self._health.hear(sample, False, self._track)
             return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
         if self._timeline is not None:
-            wider = self._health.compare(sample, self._track, self._timeline.newest)
-            if wider is not None:
-                self._timeline.widen(wider)
+            self._health.compare(sample, self._track, self._timeline)
             if self._timeline.estimator.takes_positions:
                 self._health.hear(sample, None, self._track)
                 return self._add_fix(sample)
@@ -289,13 +287,13 @@ class Localizer:
         """Let a measurement correct the estimate, or only be judged while UWB is not trusted."""
         if self._timeline is None:
             raise RuntimeError('there is no estimate to correct')
-        withhold = self._health.disagree and source in (RANGE_SOURCE, UWB_FIX_SOURCE)
+        withhold = self._health.withholds and source in (RANGE_SOURCE, UWB_FIX_SOURCE)
         innovation = self._timeline.add(sample, withhold=withhold)
         if innovation is None:
             return _refused(sample.stamp, source, key, 'repeated')
         self._watch(innovation)
         if withhold:
-            innovation = replace(innovation, accepted=False, reason=Cause.DISAGREE.value)
+            innovation = innovation._replace(accepted=False, reason=Cause.DISAGREE.value)
         self._health.hear(sample, innovation.accepted, self._track)
         return Outcome(self.estimate, (innovation,))
 

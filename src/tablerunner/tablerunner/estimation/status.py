@@ -16,7 +16,7 @@ class LocalizerState(Enum):
 
 
 class Cause(Enum):
-    """What carries the pose: measurements, or odometry alone and why."""
+    """What carries the pose: measurements and odometry, or mostly one of them and why."""
 
     FUSED = 'fused'
     CHOSEN = 'the estimator takes no measurements'
@@ -25,7 +25,8 @@ class Cause(Enum):
     REFUSED = 'measurements refused'
     BLOCKED = 'all anchors blocked'
     ONE_ANCHOR = 'one anchor only'
-    DISAGREE = 'UWB and odometry disagree'
+    DISAGREE = 'UWB and odometry disagree'  # and wheels that slip cannot explain it
+    SLIP = 'wheels slip'  # UWB carries the pose more than usual
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,7 @@ class LocalizerStatus:
 
     @property
     def degraded(self) -> bool:
-        """Whether the pose goes by odometry although measurements were meant to correct it."""
+        """Whether the pose goes by less than measurements and odometry together, unwished."""
         return self.cause not in (None, Cause.FUSED, Cause.CHOSEN)
 
 
@@ -61,7 +62,9 @@ def tracking(cause: Cause, unfused_s: float, silence_s: float) -> LocalizerStatu
         For longer it is worth telling.
     """
     words = LocalizerState.TRACKING.value
-    if cause is not Cause.FUSED:
+    if cause is Cause.SLIP:
+        words = f'{words}: {cause.value}'
+    elif cause is not Cause.FUSED:
         words = f'dead reckoning: {cause.value}'
         if unfused_s > silence_s:
             words += f', for {unfused_s:.1f} s'

@@ -19,11 +19,16 @@ from tablerunner.types import Estimate, Innovation, Matrix, OdometrySample, Rang
 _Key = tuple[int, int, str]  # stamp, rank, source key: a total order, whatever arrives first
 
 
+_RANGE = 1
+"""Rank of a range among entries of one stamp: after odometry, before poses."""
+_POSE, _WIDENING, _WITHHELD = 2, 3, 4
+"""What is withheld is only judged, after all that counts."""
+
+
 @dataclass(slots=True)
 class _Entry:
     key: _Key
     measurement: Measurement | None  # None: an odometry sample, prediction only
-    withheld: bool = False  # only judged, the estimate stays
     widening: Matrix | None = None  # added to the covariance of x and y
     after: Estimate = field(init=False)
 
@@ -86,17 +91,33 @@ class Timeline:
         With `withhold` the estimate stays: the innovation says what it would have done.
         """
         key = _key(measurement)
-        position = bisect_left(self._keys, key)
-        if position < len(self._keys) and self._keys[position] == key:
+        aside = (key[0], _WITHHELD, key[2])
+        if self._holds(key) or self._holds(aside):
             return None
-        index = self._insert(_Entry(key, measurement, withhold))
+        index = self._insert(_Entry(aside if withhold else key, measurement))
         innovation = self._run(index)
         self._trim()
         return innovation
 
     def widen(self, covariance: Matrix) -> None:
         """Add to the covariance of x and y, shape (2, 2), at the newest stamp."""
-        self._run(self._insert(_Entry((self._keys[-1][0], 3, ''), None, False, covariance)))
+        self._run(self._insert(_Entry((self._keys[-1][0], _WIDENING, ''), None, covariance)))
+
+    def withhold_past(self, source: str) -> None:
+        """Take back all ranges and what `source` gave, as far as the history reaches."""
+        entries = self._entries[1:]
+        for entry in entries:
+            stamp, rank, name = entry.key
+            if rank == _RANGE or (rank == _POSE and name == source):
+                entry.key = (stamp, _WITHHELD, name)
+        entries.sort(key=_by_key)
+        self._entries[1:] = entries
+        self._keys[1:] = [entry.key for entry in entries]
+        self._run(1)
+
+    def _holds(self, key: _Key) -> bool:
+        position = bisect_left(self._keys, key)
+        return position < len(self._keys) and self._keys[position] == key
 
     def _insert(self, entry: _Entry) -> int:
         index = bisect_right(self._keys, entry.key)
@@ -105,26 +126,56 @@ class Timeline:
         return index
 
     def _run(self, index: int) -> Innovation | None:
-        """Work out all entries from `index` on; return the innovation of the first."""
-        first = None
-        for position in range(max(index, 1), len(self._entries)):
-            entry, estimate = self._entries[position], self._entries[position - 1].after
-            stamp = entry.key[0]
+        """Work out all entries from `index` on; return the innovation of that one.
+
+        Ranges of one instant are one step: who comes first in it does not matter.
+        """
+        position, wanted = self._first_of_instant(max(index, 1)), None
+        while position < len(self._entries):
+            estimate = self._entries[position - 1].after
+            stamp = self._keys[position][0]
             if stamp > estimate.stamp:
                 motion = self._track.motion(estimate.stamp, stamp)
                 estimate = self.estimator.predict(estimate, motion, stamp)
-            innovation = None
-            if entry.measurement is not None:
-                after, innovation = self.estimator.update(estimate, entry.measurement)
-                estimate = estimate if entry.withheld else after
-            elif entry.widening is not None:
-                wider = np.array(estimate.covariance)
-                wider[:2, :2] += entry.widening
-                estimate = replace(estimate, covariance=wider)
-            entry.after = estimate
-            if position == index:
-                first = innovation
-        return first
+            samples = self._ranges_at(position)
+            innovations: tuple[Innovation, ...] = ()
+            if samples:
+                estimate, innovations = self.estimator.update_ranges(estimate, samples)
+            else:
+                entry = self._entries[position]
+                if entry.measurement is not None:
+                    after, innovation = self.estimator.update(estimate, entry.measurement)
+                    estimate = estimate if entry.key[1] == _WITHHELD else after
+                    innovations = (innovation,)
+                elif entry.widening is not None:
+                    wider = np.array(estimate.covariance)
+                    wider[:2, :2] += entry.widening
+                    estimate = replace(estimate, covariance=wider)
+            for offset in range(max(len(innovations), 1)):
+                self._entries[position + offset].after = estimate
+            if position <= index < position + len(innovations):
+                wanted = innovations[index - position]
+            position += max(len(innovations), 1)
+        return wanted
+
+    def _first_of_instant(self, index: int) -> int:
+        """Return where the ranges begin that share the instant of a range."""
+        if index >= len(self._keys):
+            return index
+        stamp, rank, _ = self._keys[index]
+        while rank == _RANGE and self._keys[index - 1][:2] == (stamp, _RANGE):
+            index -= 1
+        return index
+
+    def _ranges_at(self, position: int) -> list[RangeSample]:
+        """Return the ranges of the instant that begins at an entry; none if it is no range."""
+        instant, samples = (self._keys[position][0], _RANGE), []
+        while position < len(self._keys) and self._keys[position][:2] == instant:
+            measurement = self._entries[position].measurement
+            if isinstance(measurement, RangeSample):
+                samples.append(measurement)
+            position += 1
+        return samples
 
     def _trim(self) -> None:
         horizon = self._keys[-1][0] - self._history
@@ -136,7 +187,11 @@ class Timeline:
         self._track.trim(self._keys[0][0])
 
 
+def _by_key(entry: _Entry) -> _Key:
+    return entry.key
+
+
 def _key(measurement: Measurement) -> _Key:
     if isinstance(measurement, RangeSample):
-        return (measurement.stamp, 1, f'{measurement.anchor_id}/{measurement.tag_id}')
-    return (measurement.stamp, 2, measurement.source)
+        return (measurement.stamp, _RANGE, f'{measurement.anchor_id}/{measurement.tag_id}')
+    return (measurement.stamp, _POSE, measurement.source)

@@ -19,28 +19,29 @@ from tablerunner.estimation.estimator import EstimatorConfig
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.estimation.motion_comparison import Disagreement, RangeWindow, compare_motion
 from tablerunner.estimation.status import Cause
+from tablerunner.estimation.timeline import Timeline
 from tablerunner.estimation.track import OdometryTrack
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import (
     Anchor,
     Estimate,
     LosState,
-    Matrix,
     PoseSample,
     RangeSample,
     Vector,
     nanoseconds,
     seconds,
 )
+from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 _MOST = 4000
 """Events and ranges kept at most, should odometry stand still while ranges pour in."""
-_EVERY_S = 0.25
+_EVERY_S = 0.1
 """Time between two comparisons of motion."""
 _MOST_COMPARED = 200
 """Ranges compared at most: of more, every so many."""
-_CONFIRMATIONS = 2
-"""Comparisons in a row that must say the same."""
+_CONFIRMATIONS = 3
+"""Comparisons in a row that must find agreement before UWB is taken again."""
 _SPAN_NEEDED = 0.6
 """Share of the window that ranges must span before they are compared."""
 
@@ -137,9 +138,9 @@ class UwbHealth:
         self._events.clear()
         self._rows: deque[_Row] = deque(maxlen=_MOST)
         self._compared = stamp
-        self._agreed = 0  # comparisons in a row: positive for agreement, negative against it
+        self._agreed = 0  # comparisons in a row
         self._slipped_m = 0.0  # by how much wheels may have slipped since both disagree
-        self.disagree = False
+        self._fault: Cause | None = None  # what the last comparisons found
 
     # -- what is heard --------------------------------------------------------------------------
 
@@ -169,26 +170,23 @@ class UwbHealth:
         while self._events[0].heard < oldest:
             self._events.popleft()
 
-    def compare(
-        self, sample: RangeSample, track: OdometryTrack, estimate: Estimate
-    ) -> Matrix | None:
-        """Take a range beside odometry, and compare both motions when it is time.
+    def compare(self, sample: RangeSample, track: OdometryTrack, timeline: Timeline) -> None:
+        """Take a range beside odometry; when it is time compare both motions, and act on it.
+
+        Where wheels that slip can explain what differs, the pose may be wrong by all that they
+        slipped: its covariance grows by that along the way, and the ranges put it right. Where
+        they cannot, UWB is not taken (`withholds`), nor what it gave of late.
 
         Parameters
         ----------
         sample : RangeSample
             Of one of the anchors.
         track : OdometryTrack
-            Must reach back to the range and to the estimate.
-        estimate : Estimate
-            The newest.
-
-        Returns
-        -------
-        ndarray or None, shape (2, 2)
-            By how much the variance of the position grows, along the way, where both disagree
-            and wheels that slip can explain it: the pose may be wrong by all that they slipped.
+            Must reach back to the range and to the newest estimate.
+        timeline : Timeline
+            Of the estimate.
         """
+        estimate = timeline.newest
         index, anchor = self._anchors[sample.anchor_id]
         odom = track.pose(sample.stamp)
         cos, sin = math.cos(odom.heading), math.sin(odom.heading)
@@ -198,28 +196,31 @@ class UwbHealth:
         self._rows.append(_Row(sample.stamp, index, tag, sample.range_m - anchor.bias_m, std))
         now = max(sample.stamp, estimate.stamp)
         if now - self._compared < nanoseconds(_EVERY_S):
-            return None
+            return
         elapsed = seconds(now - self._compared)
         self._compared = now
         map_to_odom = estimate.pose @ track.pose(estimate.stamp).inverse()
         found = self._compare(now, estimate, map_to_odom)
-        apart = found is not None and (
-            found.length_m > self._config.disagreement
-            and found.deviations > self._config.disagreement_deviations
-        )
-        self._agreed = min(self._agreed, 0) - 1 if apart else max(self._agreed, 0) + 1
-        if found is None or self._agreed > -_CONFIRMATIONS:
+        if found is None or (
+            found.length_m < self._config.disagreement
+            or found.deviations < self._config.disagreement_deviations
+        ):
+            self._agreed += 1
             if self._agreed >= _CONFIRMATIONS:
-                self.disagree, self._slipped_m = False, 0.0
-            return None
+                self._fault, self._slipped_m = None, 0.0
+            return
+        self._agreed = 0
+        fault, before = self._fault, self._slipped_m
         # The first finding is of the whole window, each further one of what has passed since.
-        share = min(elapsed / self._config.window, 1.0) if self.disagree else 1.0
-        before, self._slipped_m = self._slipped_m, self._slipped_m + share * found.slipped_m
-        self.disagree = True
-        if found.slipped_m <= 0.0:
-            return None
-        direction = found.by_odometry / np.linalg.norm(found.by_odometry)
-        return np.outer(direction, direction) * (self._slipped_m**2 - before**2)
+        share = 1.0 if fault is None else min(elapsed / self._config.window, 1.0)
+        self._slipped_m += share * found.slipped_m
+        self._fault = Cause.SLIP if found.slipped_m > 0.0 else Cause.DISAGREE
+        if self._fault is Cause.SLIP:
+            direction = found.by_odometry / np.linalg.norm(found.by_odometry)
+            grown = self._slipped_m**2 - before**2
+            timeline.widen(grown * np.outer(direction, direction))
+        elif fault is not Cause.DISAGREE:
+            timeline.withhold_past(UWB_FIX_SOURCE)
 
     def _compare(self, now: int, estimate: Estimate, map_to_odom: Pose2) -> Disagreement | None:
         rows, span = self._rows, self._config.window
@@ -242,6 +243,11 @@ class UwbHealth:
         )
         return compare_motion(window, span, math.sqrt(max(float(estimate.covariance[2, 2]), 0.0)))
 
+    @property
+    def withholds(self) -> bool:
+        """Whether what UWB gives is only to be judged, not taken."""
+        return self._fault is Cause.DISAGREE
+
     # -- what comes of it -----------------------------------------------------------------------
 
     def unfused_s(self, now: int) -> float:
@@ -256,8 +262,8 @@ class UwbHealth:
         events = [event for event in self._events if event.heard >= fresh]
         if not events:
             return Cause.SILENT
-        if self.disagree:
-            return Cause.DISAGREE
+        if self._fault is not None:
+            return self._fault
         blocked = all(event.blocked for event in events)
         judged = [event.accepted for event in events if event.accepted is not None]
         if judged and not any(judged):

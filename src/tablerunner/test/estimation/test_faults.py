@@ -2,7 +2,6 @@
 
 import math
 import warnings
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tablerunner.estimation import ESTIMATORS, Localizer, LocalizerConfig, LocalizerState
+from tablerunner.estimation import ESTIMATORS, Localizer, LocalizerConfig
 from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry.motion import Motion, advance
-from tablerunner.types import Anchor, LosState, OdometrySample, PoseSample, RangeSample
+from tablerunner.types import LosState, OdometrySample, PoseSample, RangeSample
 
 SECOND = 1_000_000_000
 STEP = 20_000_000
@@ -77,19 +76,15 @@ class Robot:
         self.localizer = Localizer(config, room.anchors)
         self.stamp, self.true, self.odom, self.count = EPOCH, START, Pose2(), 0
         self.heard = range(4)
-        self.sent = self.refused = self.used = 0
-        self.reasons = Counter()
 
     # -- what is checked of each answer ---------------------------------------------------------
 
     def take(self, give, sample):
         """Hand a sample over; nothing may be raised and all that is believed must be sound."""
         outcome = give(sample)
-        self.sent += 1
         for item in (*outcome.refusals, *outcome.innovations):
             accepted = getattr(item, 'accepted', False)
             assert accepted or item.reason, item
-            self.reasons[item.reason] += 1
         for estimate in (outcome.estimate, self.localizer.estimate):
             if estimate is not None:
                 assert_sound(estimate)
@@ -103,12 +98,14 @@ class Robot:
     # -- good data ------------------------------------------------------------------------------
 
     def odometry(self):
+        """Return the odometry of the next 20 ms."""
         self.stamp, self.count = self.stamp + STEP, self.count + 1
         step = Motion(0.01, 0.006 * math.sin(self.count * 0.005), 0.02)
         self.true, self.odom = advance(self.true, step), advance(self.odom, step)
         return OdometrySample(self.stamp, self.odom, 0.5, step.turn_rad / 0.02)
 
     def range_of(self, index):
+        """Return the range of an anchor now."""
         anchor = self.room.anchors[index]
         tag = self.true.transform(np.array(self.room.lever[:2]))
         distance = math.dist((*tag, self.room.lever[2]), anchor.position)
@@ -122,6 +119,7 @@ class Robot:
         )
 
     def drive(self, steps, change=lambda sample: sample, times=1):
+        """Drive, with a range at every second step, or many."""
         for _ in range(steps):
             self.take(self.localizer.add_odometry, self.odometry())
             if self.count % 2 == 0 and self.heard:
@@ -133,6 +131,7 @@ class Robot:
     # -- broken data ----------------------------------------------------------------------------
 
     def suffer(self, fault):
+        """Let a fault happen."""
         kind, *given = fault
         localizer = self.localizer
         if kind == 'drive':

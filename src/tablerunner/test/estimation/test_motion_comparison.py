@@ -1,4 +1,4 @@
-"""Displacement by UWB beside that by odometry: what is found, how certain, and what is no motion."""
+"""Displacement by UWB beside that by odometry: what is found, how surely, what is no motion."""
 
 import math
 

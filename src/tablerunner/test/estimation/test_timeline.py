@@ -69,9 +69,11 @@ def with_poses(drive, seed, every=13):
     """
     rng = np.random.default_rng(seed)
     poses = []
-    for count, (stamp, true) in enumerate(list(drive.truth.items())[5::every]):
+    for count, stamp in enumerate(sorted(drive.truth)[5::every]):
+        true = drive.truth[stamp]
         source, heading = ('camera/pose', 1e-3) if count % 2 else ('uwb/pose', np.inf)
-        seen = Pose2(*(rng.normal(0, 0.05, 3) + (true.x, true.y, true.heading)))
+        dx, dy, turn = rng.normal(0, 0.05, 3)
+        seen = Pose2(true.x + dx, true.y + dy, true.heading + turn)
         covariance = np.diag([2.5e-3, 2.5e-3, heading])
         poses.append(PoseSample(stamp + 3_000_000 * (count % 3), seen, covariance, source))
     both = [*in_time(drive), *poses]

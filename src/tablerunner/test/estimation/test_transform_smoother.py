@@ -82,7 +82,7 @@ def test_follow_of_a_steady_transform_leaves_it(true, way):
 
 
 def test_follow_moves_a_robot_far_from_the_origin_of_odom_gently():
-    """A turn of map -> odom by 0.1 rad, 1000 m from its origin: the robot itself turns on the spot.
+    """A turn of map -> odom by 0.1 rad, 1000 m from its origin: the robot turns on the spot.
 
     Fading the transform itself would swing the robot by a hundred metres on the way.
     """
