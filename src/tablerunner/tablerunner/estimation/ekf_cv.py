@@ -19,12 +19,20 @@ from tablerunner.estimation.estimator import (
     Measurement,
     RangeByRange,
     Start,
+    no_use,
 )
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Innovation, RangeSample, Vector
+from tablerunner.types import (
+    Anchor,
+    Estimate,
+    HeadingSample,
+    Innovation,
+    RangeSample,
+    Vector,
+)
 
 _SIZE = 5
 _STILL_M_S = 1.0  # deviation of each velocity at the start: any speed of a robot indoors
@@ -83,6 +91,8 @@ class EkfCv(RangeByRange):
 
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a range or a position (Sun 46, 47, 32)."""
+        if isinstance(measurement, HeadingSample):
+            return no_use(estimate, measurement, "the heading is odometry's")
         if isinstance(measurement, RangeSample):
             anchor = self._anchors[measurement.anchor_id]
             distance, slope = self._distance(estimate.mean, anchor)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.checks import check_odometry, check_pose, check_range
+from tablerunner.estimation.compass import Compass
 from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
+from tablerunner.estimation.evidence import Evidence
 from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.registry import ESTIMATORS
@@ -26,6 +27,7 @@ from tablerunner.types import (
     Anchor,
     Estimate,
     Innovation,
+    MagneticSample,
     OdometrySample,
     PoseSample,
     RangeSample,
@@ -36,7 +38,6 @@ from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 ODOMETRY_SOURCE = 'odom'
 INITIAL_POSE_SOURCE = 'initialpose'
-_FEWEST_FOR_LOST = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,7 @@ class Localizer:
         self._health = UwbHealth(config.health, config.filter, (), self._lever_arm)
         self._fusing = True
         self._starts = 0
+        self._compass = Compass(config.compass)
         self._clear()
         self.set_anchors(anchors)
 
@@ -71,12 +73,12 @@ class Localizer:
         self._track = OdometryTrack()
         self._fixes.reset()
         self._health.begin(0)
+        self._compass.reset()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
         self._lost = False
-        self._recent: deque[tuple[int, bool]] = deque()  # stamp, accepted
-        self._refused = 0  # of those
+        self._evidence = Evidence()
         self._forget_start()
 
     def _forget_start(self) -> None:
@@ -98,6 +100,7 @@ class Localizer:
         """
         before, self.config = self.config, config
         self._fixes.configure(config.positioner)
+        self._compass.config = config.compass
         self._health.configure(config.health, config.filter)
         if self._timeline is None:
             return
@@ -262,6 +265,23 @@ class Localizer:
             return _refused(sample.stamp, sample.source, '', reason)
         return self._correct(sample, sample.source, '')
 
+    def add_magnetic(self, sample: MagneticSample) -> Outcome:
+        """Take a magnetic field: a heading, where it is plausible and the start is known."""
+        heading = self._compass.add(sample)
+        if isinstance(heading, Refusal):
+            return Outcome(None, (), (heading,))
+        if heading is None:
+            return Outcome()
+        reason = self._switch_fault() or self._place_fault(sample.stamp)
+        if not reason and self._timeline is None:
+            reason = 'start not known yet'
+        if reason or self._timeline is None:
+            return _refused(sample.stamp, heading.source, '', reason)
+        innovation = self._timeline.add(heading)
+        if innovation is None:
+            return _refused(sample.stamp, heading.source, '', 'repeated')
+        return Outcome(self.estimate, (innovation,))
+
     def set_pose(self, sample: PoseSample) -> Outcome:
         """Begin anew at a pose that a user gives; it overrides whatever was believed."""
         reason = check_pose(sample)
@@ -311,8 +331,7 @@ class Localizer:
         self._starts += 1
         self._health.begin(start.stamp)
         self._lost = False
-        self._recent.clear()
-        self._refused = 0
+        self._evidence = Evidence()
 
     def _place_fault(self, stamp: int) -> str:
         """Return why a measurement of this stamp has no place beside odometry; '' if it has."""
@@ -357,16 +376,16 @@ class Localizer:
             self._begin(Start(stamp, estimate.mean[:3], estimate.pose_covariance))
 
     def _watch(self, innovation: Innovation) -> None:
-        """Count refusals at the gate; when most measurements contradict the pose, it is lost."""
+        """Gather what speaks against the pose; when it is too much, the robot is lost."""
         if self.config.estimator == 'dead_reckoning' or not innovation.considered:
             return
-        recent = self._recent
-        recent.append((innovation.stamp, innovation.accepted))
-        self._refused += not innovation.accepted
-        while recent[-1][0] - recent[0][0] > nanoseconds(self.config.lost_window):
-            self._refused -= not recent.popleft()[1]
-        share = self._refused / len(recent)
-        if len(recent) >= _FEWEST_FOR_LOST and share > self.config.lost_share:
+        self._evidence.add(innovation, nanoseconds(self.config.lost_window))
+        evidence, config = self._evidence, self.config
+        if (
+            evidence.mean > config.lost_nis
+            or evidence.refused_for > nanoseconds(config.lost_silence)
+            or evidence.doubted_for > nanoseconds(config.lost_doubt)
+        ):
             self._timeline = None
             self._lost = True
             self._forget_start()

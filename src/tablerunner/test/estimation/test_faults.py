@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tablerunner.estimation import ESTIMATORS, Localizer, LocalizerConfig
 from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry.motion import Motion, advance
-from tablerunner.types import LosState, OdometrySample, PoseSample, RangeSample
+from tablerunner.types import LosState, MagneticSample, OdometrySample, PoseSample, RangeSample
 
 SECOND = 1_000_000_000
 STEP = 20_000_000
@@ -61,6 +61,8 @@ faults = st.one_of(
     st.tuples(st.just('pose now'), st.tuples(*[st.floats(-20, 20)] * 3), covariances),
     st.tuples(st.just('set pose'), stamps, st.tuples(*[numbers] * 3), covariances),
     st.tuples(st.just('set pose now'), st.tuples(*[st.floats(-20, 20)] * 3), covariances),
+    st.tuples(st.just('magnetic'), stamps, st.tuples(*[numbers] * 3)),
+    st.tuples(st.just('north'), st.floats(-4, 4)),
     st.tuples(st.just('anchors'), st.integers(0, 4)),
     st.tuples(st.just('estimator'), st.sampled_from(sorted(ESTIMATORS))),
     st.tuples(st.just('switch'), st.booleans()),
@@ -170,6 +172,17 @@ class Robot:
             stamp = given[0] if len(given) == 3 else self.stamp
             sample = PoseSample(stamp, Pose2(*given[-2]), given[-1], 'camera/pose')
             self.take(localizer.set_pose if 'set' in kind else localizer.add_pose, sample)
+        elif kind == 'magnetic':
+            self.take(localizer.add_magnetic, MagneticSample(given[0], *given[1]))
+        elif kind == 'north':
+            field = CONFIG.compass
+            north, east = math.cos(given[0]), math.sin(given[0])
+            self.take(
+                localizer.add_magnetic,
+                MagneticSample(
+                    self.stamp, field.horizontal * north, field.horizontal * east, field.vertical
+                ),
+            )
         elif kind == 'anchors':
             localizer.set_anchors(self.room.anchors[: given[0]])
         elif kind == 'estimator':

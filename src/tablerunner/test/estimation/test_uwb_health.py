@@ -144,7 +144,8 @@ def test_uwb_that_wanders_is_not_followed(room, seed):
     """All anchors together shift the tag by 0.6 m/s: odometry knows better.
 
     Before it is noticed UWB drags the pose along; at the alarm what it said in the last second is
-    taken back, and from then on it is only judged.
+    taken back, and from then on it is only judged. What contradicts the pose for two seconds may
+    be a robot that is carried: then it is lost.
     """
     robot = Robot(room, seed)
     robot.drive(5.0)
@@ -158,9 +159,9 @@ def test_uwb_that_wanders_is_not_followed(room, seed):
         return replace(sample, range_m=sample.range_m + there - here)
 
     begin = robot.stamp
-    status = robot.drive(2.0, wander)
+    status = robot.drive(1.4, wander)
     assert status.cause is Cause.DISAGREE
-    assert robot.error < 0.15  # 1.2 m by the ranges
+    assert robot.error < 0.15  # 0.84 m by the ranges
     last = robot.outcomes[-1].innovations[0]
     assert (last.accepted, last.reason) == (False, 'UWB and odometry disagree')
     assert last.nis > 0.0
