@@ -25,6 +25,10 @@ _FEWEST_EACH = 3
 """Ranges of an anchor from which its drift can be told from its constant."""
 _FEWEST_ANCHORS = 3
 """With two, one blocked anchor could not be told from a motion."""
+_WORST = 1e-6
+"""Product of both eigenvalues over the square of their sum, below which one direction is open."""
+_CLEARLY = 0.5
+"""Share of a length below which a plain fit is believed that Huber's would not reach it."""
 _KNEE = 1.5
 _ROUNDS = 3
 _ALONG = 0.8
@@ -73,9 +77,11 @@ class Disagreement(NamedTuple):
 
 
 def compare_motion(
-    window: RangeWindow, span_s: float, heading_std: float = 0.0
+    window: RangeWindow, span_s: float, heading_std: float = 0.0, least_m: float = 0.0
 ) -> Disagreement | None:
     """Return by how much UWB moved more than odometry, or None where the ranges do not tell.
+
+    A plain fit goes first, and where it finds clearly less than `least_m` the answer is None too.
 
     Whichever anchor is left out, the others must tell it too: what is returned is the least
     certain of these answers. So an anchor that disappears behind a person is no motion.
@@ -87,20 +93,22 @@ def compare_motion(
         Time that the displacement is meant for [s].
     heading_std : float
         Deviation of odometry's heading in the map [rad].
+    least_m : float
+        Displacement that is worth telling [m].
     """
     counts = np.bincount(window.anchor, minlength=len(window.anchors))
     known = np.flatnonzero(counts >= _FEWEST_EACH)
     if len(known) < _FEWEST_ANCHORS:
         return None
-    away = np.column_stack(
-        [
-            window.tags - window.anchors[window.anchor, :2],
-            window.tag_height - window.anchors[window.anchor, 2],
-        ]
-    )
-    distances = np.linalg.norm(away, axis=1)
-    slopes = away[:, :2] / np.maximum(distances, 1e-6)[:, None] * (window.times / span_s)[:, None]
+    away = window.tags - window.anchors[window.anchor, :2]
+    height = window.tag_height - window.anchors[window.anchor, 2]
+    distances = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2 + height**2)
+    slopes = away * (window.times / (span_s * np.maximum(distances, 1e-6)))[:, None]
     residuals = window.ranges - distances
+    if least_m > 0.0:
+        plain = _fit(slopes, residuals, window.stds, window.anchor, 0.0, rounds=1)
+        if plain is None or math.hypot(*plain[0]) < _CLEARLY * least_m:
+            return None
     way = window.tags[np.argmax(window.times)] - window.tags[np.argmin(window.times)]
     own = math.hypot(*way) * math.hypot(heading_std, _ODOMETRY_SHARE)
 
@@ -116,32 +124,37 @@ def compare_motion(
 
 
 def _fit(
-    slopes: Matrix, residuals: Vector, stds: Vector, index: NDArray[np.int64], own: float
+    slopes: Matrix,
+    residuals: Vector,
+    stds: Vector,
+    index: NDArray[np.int64],
+    own: float,
+    rounds: int = _ROUNDS,
 ) -> tuple[Vector, float] | None:
-    weights = 1.0 / stds**2
-    found, spread = np.zeros(2), np.zeros((2, 2))
-    for _ in range(_ROUNDS):
-        slope, residual = _centred(slopes, weights, index), _centred(residuals, weights, index)
-        information = slope.T @ (weights[:, None] * slope)
-        if np.linalg.cond(information) > 1e6:
+    """Return the displacement and its length in deviations; `own` is odometry's deviation [m]."""
+    weights = 1.0 / (stds * stds)
+    for left in range(rounds, 0, -1):
+        total = np.maximum(np.bincount(index, weights), 1e-300)
+        x, y, rest = (
+            column - (np.bincount(index, weights * column) / total)[index]
+            for column in (slopes[:, 0], slopes[:, 1], residuals)
+        )
+        along_x, along_y = weights * x, weights * y
+        xx, xy, yy = float(along_x @ x), float(along_x @ y), float(along_y @ y)
+        determinant = xx * yy - xy * xy
+        if determinant <= _WORST * (xx + yy) ** 2:
             return None
-        spread = np.linalg.inv(information)
-        found = spread @ (slope.T @ (weights * residual))
-        scaled = np.abs(residual - slope @ found) / stds
-        weights = np.minimum(1.0, _KNEE / np.maximum(scaled, _KNEE)) / stds**2
+        to_x, to_y = float(along_x @ rest), float(along_y @ rest)
+        east = (yy * to_x - xy * to_y) / determinant
+        north = (xx * to_y - xy * to_x) / determinant
+        open_ = np.abs(rest - east * x - north * y)
+        if left > 1:
+            weights = np.minimum(1.0, _KNEE / np.maximum(open_ / stds, _KNEE)) / (stds * stds)
     # Ranges that scatter more than they say make the answer as much less certain.
-    freedom = max(len(residuals) - len(np.unique(index)) - 2, 1)
-    excess = max(float(np.sum(weights * (residual - slope @ found) ** 2)) / freedom, 1.0)
-    spread = spread * excess + np.eye(2) * own**2
-    return found, math.sqrt(float(found @ np.linalg.solve(spread, found)))
-
-
-def _centred(values: NDArray[np.float64], weights: Vector, index: NDArray[np.int64]) -> Matrix:
-    """Return the values less the weighted mean of those of the same anchor."""
-    total = np.bincount(index, weights)
-    columns = values if values.ndim == 2 else values[:, None]
-    means = [
-        np.bincount(index, weights * column) / np.maximum(total, 1e-300) for column in columns.T
-    ]
-    centred = columns - np.column_stack(means)[index]
-    return np.asarray(centred if values.ndim == 2 else centred[:, 0])
+    freedom = max(len(residuals) - int(np.count_nonzero(total > 1e-300)) - 2, 1)
+    excess = max(float(weights @ (open_ * open_)) / freedom, 1.0) / determinant
+    # The covariance: the inverse of the information, and odometry's own in every direction.
+    var_x, cov, var_y = yy * excess + own * own, -xy * excess, xx * excess + own * own
+    squared = var_y * east * east - 2.0 * cov * east * north + var_x * north * north
+    deviations = math.sqrt(squared / (var_x * var_y - cov * cov))
+    return np.array([east, north]), deviations

@@ -23,12 +23,12 @@ from tablerunner.estimation.timeline import Timeline
 from tablerunner.estimation.track import OdometryTrack
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import (
+    NANOSECONDS,
     Anchor,
     Estimate,
     LosState,
     PoseSample,
     RangeSample,
-    Vector,
     nanoseconds,
     seconds,
 )
@@ -36,7 +36,7 @@ from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 _MOST = 4000
 """Events and ranges kept at most, should odometry stand still while ranges pour in."""
-_EVERY_S = 0.1
+_EVERY_S = 0.25
 """Time between two comparisons of motion."""
 _MOST_COMPARED = 200
 """Ranges compared at most: of more, every so many."""
@@ -96,7 +96,8 @@ class _Event(NamedTuple):
 class _Row(NamedTuple):
     stamp: int
     anchor: int
-    tag: tuple[float, float]  # in odom [m]
+    tag_x: float  # in odom [m]
+    tag_y: float
     range_m: float  # less the bias that is known
     std: float
 
@@ -191,9 +192,11 @@ class UwbHealth:
         odom = track.pose(sample.stamp)
         cos, sin = math.cos(odom.heading), math.sin(odom.heading)
         x, y, _ = self._lever_arm
-        tag = (odom.x + cos * x - sin * y, odom.y + sin * x + cos * y)
+        tag_x, tag_y = odom.x + cos * x - sin * y, odom.y + sin * x + cos * y
         std = math.sqrt(range_variance(self._noise, sample))
-        self._rows.append(_Row(sample.stamp, index, tag, sample.range_m - anchor.bias_m, std))
+        self._rows.append(
+            _Row(sample.stamp, index, tag_x, tag_y, sample.range_m - anchor.bias_m, std)
+        )
         now = max(sample.stamp, estimate.stamp)
         if now - self._compared < nanoseconds(_EVERY_S):
             return
@@ -228,20 +231,20 @@ class UwbHealth:
             rows.popleft()
             if not rows:
                 return None
-        stamps = [row.stamp for row in rows]
-        if max(stamps) - min(stamps) < nanoseconds(_SPAN_NEEDED * span):
+        if now - rows[0].stamp < nanoseconds(_SPAN_NEEDED * span):
             return None
-        chosen = list(rows)[:: len(rows) // _MOST_COMPARED + 1]
+        table = np.array(list(rows)[:: len(rows) // _MOST_COMPARED + 1], dtype=np.float64)
         window = RangeWindow(
-            times=np.array([seconds(row.stamp - now) for row in chosen]),
-            tags=map_to_odom.transform(np.array([row.tag for row in chosen])),
-            ranges=_column([row.range_m for row in chosen]),
-            stds=_column([row.std for row in chosen]),
-            anchor=np.array([row.anchor for row in chosen]),
+            times=(table[:, 0] - now) / NANOSECONDS,
+            tags=map_to_odom.transform(table[:, 2:4]),
+            ranges=table[:, 4],
+            stds=table[:, 5],
+            anchor=table[:, 1].astype(np.int64),
             anchors=self._places,
             tag_height=self._lever_arm[2],
         )
-        return compare_motion(window, span, math.sqrt(max(float(estimate.covariance[2, 2]), 0.0)))
+        heading_std = math.sqrt(max(float(estimate.covariance[2, 2]), 0.0))
+        return compare_motion(window, span, heading_std, self._config.disagreement)
 
     @property
     def withholds(self) -> bool:
@@ -284,7 +287,3 @@ class UwbHealth:
 def _is_blocked(sample: RangeSample) -> bool:
     """Whether a range is judged to have come around an obstacle."""
     return sample.nlos_probability > 0.5 or sample.los is LosState.NLOS
-
-
-def _column(values: list[float]) -> Vector:
-    return np.array(values, dtype=np.float64)
