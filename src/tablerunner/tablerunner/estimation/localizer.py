@@ -148,7 +148,8 @@ class Localizer:
                 cause = Cause.SWITCHED_OFF
             elif config.estimator == 'dead_reckoning':
                 cause = Cause.CHOSEN
-            return tracking(cause, self._health.unfused_s(now), config.health.silence)
+            unfused, withheld = self._health.unfused_s(now), self._health.withholds
+            return tracking(cause, unfused, config.health.silence, withheld=withheld)
         if not self._anchors:
             return LocalizerStatus(LocalizerState.WAITING, 'no anchors yet')
         if not len(self._track):

@@ -26,7 +26,7 @@ class Cause(Enum):
     BLOCKED = 'all anchors blocked'
     ONE_ANCHOR = 'one anchor only'
     DISAGREE = 'UWB and odometry disagree'  # and wheels that slip cannot explain it
-    SLIP = 'wheels slip'  # UWB carries the pose more than usual
+    SLIP = 'wheels slip'
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,9 @@ class LocalizerStatus:
         return self.cause not in (None, Cause.FUSED, Cause.CHOSEN)
 
 
-def tracking(cause: Cause, unfused_s: float, silence_s: float) -> LocalizerStatus:
+def tracking(
+    cause: Cause, unfused_s: float, silence_s: float, *, withheld: bool = False
+) -> LocalizerStatus:
     """Return the status of a localiser that has a pose, in words.
 
     Parameters
@@ -60,9 +62,11 @@ def tracking(cause: Cause, unfused_s: float, silence_s: float) -> LocalizerStatu
         Time since a measurement was last accepted [s].
     silence_s : float
         For longer it is worth telling.
+    withheld : bool
+        Whether UWB is not taken because it disagrees.
     """
     words = LocalizerState.TRACKING.value
-    if cause is Cause.SLIP:
+    if cause is Cause.SLIP or (cause is Cause.DISAGREE and not withheld):
         words = f'{words}: {cause.value}'
     elif cause is not Cause.FUSED:
         words = f'dead reckoning: {cause.value}'

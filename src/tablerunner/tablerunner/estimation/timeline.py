@@ -8,20 +8,18 @@ depend on the order of arrival: late data in place equal on-time data, to the la
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, field, replace
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from tablerunner.estimation.estimator import Estimator, Measurement, Start
 from tablerunner.estimation.track import OdometryTrack
-from tablerunner.types import Estimate, Innovation, Matrix, OdometrySample, RangeSample
+from tablerunner.types import Estimate, Innovation, OdometrySample, RangeSample
 
 _Key = tuple[int, int, str]  # stamp, rank, source key: a total order, whatever arrives first
 
 
 _RANGE = 1
 """Rank of a range among entries of one stamp: after odometry, before poses."""
-_POSE, _WIDENING, _WITHHELD = 2, 3, 4
+_POSE, _WITHHELD = 2, 3
 """What is withheld is only judged, after all that counts."""
 
 
@@ -29,7 +27,6 @@ _POSE, _WIDENING, _WITHHELD = 2, 3, 4
 class _Entry:
     key: _Key
     measurement: Measurement | None  # None: an odometry sample, prediction only
-    widening: Matrix | None = None  # added to the covariance of x and y
     after: Estimate = field(init=False)
 
 
@@ -99,21 +96,18 @@ class Timeline:
         self._trim()
         return innovation
 
-    def widen(self, covariance: Matrix) -> None:
-        """Add to the covariance of x and y, shape (2, 2), at the newest stamp."""
-        self._run(self._insert(_Entry((self._keys[-1][0], _WIDENING, ''), None, covariance)))
-
     def withhold_past(self, source: str) -> None:
         """Take back all ranges and what `source` gave, as far as the history reaches."""
-        entries = self._entries[1:]
+        first = bisect_right(self._keys, (self.oldest_stamp, 99, ''))
+        entries = self._entries[first:]
         for entry in entries:
             stamp, rank, name = entry.key
             if rank == _RANGE or (rank == _POSE and name == source):
                 entry.key = (stamp, _WITHHELD, name)
         entries.sort(key=_by_key)
-        self._entries[1:] = entries
-        self._keys[1:] = [entry.key for entry in entries]
-        self._run(1)
+        self._entries[first:] = entries
+        self._keys[first:] = [entry.key for entry in entries]
+        self._run(first)
 
     def _holds(self, key: _Key) -> bool:
         position = bisect_left(self._keys, key)
@@ -147,10 +141,6 @@ class Timeline:
                     after, innovation = self.estimator.update(estimate, entry.measurement)
                     estimate = estimate if entry.key[1] == _WITHHELD else after
                     innovations = (innovation,)
-                elif entry.widening is not None:
-                    wider = np.array(estimate.covariance)
-                    wider[:2, :2] += entry.widening
-                    estimate = replace(estimate, covariance=wider)
             for offset in range(max(len(innovations), 1)):
                 self._entries[position + offset].after = estimate
             if position <= index < position + len(innovations):

@@ -70,8 +70,7 @@ class UwbHealthConfig(Config):
         0.4,
         unit='m',
         description=(
-            'Displacements by UWB and by odometry over that time that differ by more disagree: '
-            'then UWB is not taken'
+            'Displacements by UWB and by odometry over that time that differ by more disagree'
         ),
         above=0.0,
         high=1e6,
@@ -82,6 +81,14 @@ class UwbHealthConfig(Config):
         description='They must also differ by so many standard deviations',
         above=0.0,
         high=1e6,
+        dynamic=True,
+    )
+    dead_reckon: bool = parameter(
+        False,
+        description=(
+            'Whether UWB is not taken while it disagrees with odometry otherwise than by wheels '
+            'that slip; else the estimator itself decides which of them to doubt'
+        ),
         dynamic=True,
     )
 
@@ -140,7 +147,6 @@ class UwbHealth:
         self._rows: deque[_Row] = deque(maxlen=_MOST)
         self._compared = stamp
         self._agreed = 0  # comparisons in a row
-        self._slipped_m = 0.0  # by how much wheels may have slipped since both disagree
         self._fault: Cause | None = None  # what the last comparisons found
 
     # -- what is heard --------------------------------------------------------------------------
@@ -172,11 +178,9 @@ class UwbHealth:
             self._events.popleft()
 
     def compare(self, sample: RangeSample, track: OdometryTrack, timeline: Timeline) -> None:
-        """Take a range beside odometry; when it is time compare both motions, and act on it.
+        """Take a range beside odometry, and compare both motions when it is time.
 
-        Where wheels that slip can explain what differs, the pose may be wrong by all that they
-        slipped: its covariance grows by that along the way, and the ranges put it right. Where
-        they cannot, UWB is not taken (`withholds`), nor what it gave of late.
+        With `dead_reckon`, what UWB gave of late is taken back when both begin to disagree.
 
         Parameters
         ----------
@@ -200,7 +204,6 @@ class UwbHealth:
         now = max(sample.stamp, estimate.stamp)
         if now - self._compared < nanoseconds(_EVERY_S):
             return
-        elapsed = seconds(now - self._compared)
         self._compared = now
         map_to_odom = estimate.pose @ track.pose(estimate.stamp).inverse()
         found = self._compare(now, estimate, map_to_odom)
@@ -210,19 +213,12 @@ class UwbHealth:
         ):
             self._agreed += 1
             if self._agreed >= _CONFIRMATIONS:
-                self._fault, self._slipped_m = None, 0.0
+                self._fault = None
             return
         self._agreed = 0
-        fault, before = self._fault, self._slipped_m
-        # The first finding is of the whole window, each further one of what has passed since.
-        share = 1.0 if fault is None else min(elapsed / self._config.window, 1.0)
-        self._slipped_m += share * found.slipped_m
+        before = self.withholds
         self._fault = Cause.SLIP if found.slipped_m > 0.0 else Cause.DISAGREE
-        if self._fault is Cause.SLIP:
-            direction = found.by_odometry / np.linalg.norm(found.by_odometry)
-            grown = self._slipped_m**2 - before**2
-            timeline.widen(grown * np.outer(direction, direction))
-        elif fault is not Cause.DISAGREE:
+        if self.withholds and not before:
             timeline.withhold_past(UWB_FIX_SOURCE)
 
     def _compare(self, now: int, estimate: Estimate, map_to_odom: Pose2) -> Disagreement | None:
@@ -249,7 +245,7 @@ class UwbHealth:
     @property
     def withholds(self) -> bool:
         """Whether what UWB gives is only to be judged, not taken."""
-        return self._fault is Cause.DISAGREE
+        return self._config.dead_reckon and self._fault is Cause.DISAGREE
 
     # -- what comes of it -----------------------------------------------------------------------
 
