@@ -24,7 +24,7 @@ _POWER_AT_1M_DBM = -63.0  # -14.3 dBm sent, less 48.7 dB of free space at 6.5 GH
 # How far the first path lies under the whole signal, for the least and the most detour, and how
 # much of the signal is lost [dB]. Less than about 6 dB tells of a line of sight, more than 10 dB
 # of none (the rule of the radios' maker); a thin obstacle lies between.
-_GAP_DB = {'': (3.0, 3.0), 'person': (7.5, 13.0), 'thing': (9.0, 17.0)}
+GAP_DB = {'': (3.0, 3.0), 'person': (7.5, 13.0), 'thing': (9.0, 17.0)}
 _LOSS_DB = {'': 0.0, 'person': 5.0, 'thing': 8.0}
 
 
@@ -127,7 +127,7 @@ class Radio:
         times = _exchange_times(self._tag_clock, clock, flights, delays)
         power = _POWER_AT_1M_DBM - 20.0 * math.log10(max(distance, 0.1)) - _LOSS_DB[blocked]
         power += errors.power_std * float(normal[3])
-        thin, thick = _GAP_DB[blocked]
+        thin, thick = GAP_DB[blocked]
         gap = max(thin + (thick - thin) * detour + errors.power_std * float(normal[4]), 0.0)
         sample = ExchangeSample(
             stamp,
