@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tablerunner.geometry.angles import wrap
 from tablerunner.types import Estimate, Matrix, Vector
+
+Flags = NDArray[np.bool_]
 
 
 class Expected(NamedTuple):
@@ -35,3 +38,51 @@ def correct(estimate: Estimate, expected: Expected, stamp: int) -> Estimate:
     keep = np.eye(len(mean)) - gain @ expected.slope
     covariance = keep @ estimate.covariance @ keep.T + gain @ expected.noise @ gain.T
     return Estimate(stamp, mean, 0.5 * (covariance + covariance.T))
+
+
+class CorrectedByOne(NamedTuple):
+    """What a single number did to a state, or to many states at once."""
+
+    mean: Matrix  # (..., n)
+    covariance: Matrix  # (..., n, n)
+    spread: Vector  # (...), S
+
+
+def correct_by_one(
+    mean: Matrix,
+    covariance: Matrix,
+    innovation: Vector,
+    slope: Matrix,
+    noise: float,
+    used: Flags | None = None,
+) -> CorrectedByOne:
+    """Return the state corrected by one number, in Joseph's form (Sun 32), for any leading axes.
+
+    (I - K H) P (I - K H)' + K R K' with its products of rank one written out: with
+    A = P - K (H P), the rest is A - (A H' - K R) K'.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (..., n)
+        The third state is an angle.
+    covariance : ndarray, shape (..., n, n)
+    innovation : ndarray, shape (...)
+    slope : ndarray, shape (..., n)
+        d(measurement)/d(state).
+    noise : float
+        Variance of the number.
+    used : ndarray of bool, shape (...), optional
+        States that are not corrected stay as they are; all are when not given.
+    """
+    cross = np.einsum('...ij,...j->...i', covariance, slope)
+    spread = np.einsum('...i,...i->...', slope, cross) + noise
+    gain = cross / spread[..., None]
+    if used is not None:
+        gain = np.where(used[..., None], gain, 0.0)
+        innovation = np.where(used, innovation, 0.0)
+    left = covariance - gain[..., :, None] * cross[..., None, :]
+    pulled = np.einsum('...ij,...j->...i', left, slope) - gain * noise
+    left -= pulled[..., :, None] * gain[..., None, :]
+    moved = mean + gain * innovation[..., None]
+    moved[..., 2] = wrap(moved[..., 2])
+    return CorrectedByOne(moved, 0.5 * (left + np.swapaxes(left, -1, -2)), spread)

@@ -1,0 +1,261 @@
+"""The default estimator over arrays: `Ekf` of many runs in one call.
+
+The same equations as in `estimation.ekf` and `estimation.models`, where they are explained. They
+stand here once more because the single filter runs on plain floats, which is several times faster
+for one robot and impossible for many; a property test holds both together to 1e-9.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tablerunner.estimation.batch.estimate import BatchEstimate, BatchInnovation
+from tablerunner.estimation.ekf import CLIP, Ekf
+from tablerunner.estimation.estimator import EstimatorConfig, Start
+from tablerunner.estimation.models.range_model import NEAREST_M, Point3
+from tablerunner.estimation.models.state import (
+    GYRO_BIAS,
+    HEADING,
+    RANGE_BIAS,
+    RANGE_DELAY,
+    SCALE,
+    TURN_SCALE,
+    X,
+    Y,
+)
+from tablerunner.geometry.angles import wrap
+from tablerunner.odometry.batch import Motions, variances
+from tablerunner.types import Anchor
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_POSE = HEADING + 1  # states that odometry moves
+
+
+class _Expected(NamedTuple):
+    range_m: Array  # (runs,)
+    variance: Array  # (runs,), [m^2], from the state's
+    cross: Array  # (runs, n), covariance of state and range
+
+
+class BatchEkf:
+    """`Ekf` of many runs."""
+
+    name = 'ekf'
+
+    def __init__(
+        self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
+    ) -> None:
+        self.config = config
+        self._anchors = anchors
+        self._lever_arm = lever_arm
+        self._single = Ekf(config, anchors, lever_arm)
+        walk = np.zeros(RANGE_BIAS + len(anchors))
+        walk[GYRO_BIAS] = config.gyro_bias_walk**2
+        walk[RANGE_DELAY] = config.range_delay_walk**2
+        walk[RANGE_BIAS:] = config.range_bias_walk**2
+        self._walk = walk  # for each second
+
+    def start(self, start: Start, runs: int) -> BatchEstimate:
+        """Return the first estimate of `runs` filters that begin alike; see `Ekf.start`."""
+        return BatchEstimate.of(self._single.start(start), runs)
+
+    def predict(self, estimate: BatchEstimate, motions: Motions) -> BatchEstimate:
+        """Return the estimates carried on by their motions."""
+        mean, dt_s = estimate.mean, motions.dt_s
+        distance, told = motions.distance_m, motions.turn_rad
+        stands = motions.stands
+        drift_s = np.where(stands, 0.0, dt_s)
+        turn = (1.0 + mean[:, TURN_SCALE]) * told - mean[:, GYRO_BIAS] * drift_s
+        course = mean[:, HEADING] + 0.5 * turn
+        cos, sin = np.cos(course), np.sin(course)
+        length = 1.0 + mean[:, SCALE]
+        step_x, step_y = distance * cos, distance * sin
+        dx, dy = length * step_x, length * step_y
+        moved = mean.copy()
+        moved[:, X] += dx
+        moved[:, Y] += dy
+        moved[:, HEADING] = wrap(mean[:, HEADING] + turn)
+        half_x, half_y = 0.5 * dx, 0.5 * dy
+        covariance = _transport(
+            estimate.covariance,
+            (
+                (X, HEADING, -dy),
+                (Y, HEADING, dx),
+                (X, SCALE, step_x),
+                (Y, SCALE, step_y),
+                (X, TURN_SCALE, -half_y * told),
+                (Y, TURN_SCALE, half_x * told),
+                (HEADING, TURN_SCALE, told),
+                (X, GYRO_BIAS, half_y * drift_s),
+                (Y, GYRO_BIAS, -half_x * drift_s),
+                (HEADING, GYRO_BIAS, -drift_s),
+            ),
+        )
+        turned = 1.0 + mean[:, TURN_SCALE]
+        by_distance = (length * cos, length * sin, np.zeros_like(cos))
+        by_turn = (-half_y * turned, half_x * turned, turned)
+        self._add_noise(covariance, estimate, motions, (by_distance, by_turn))
+        return BatchEstimate(moved, covariance, _twist(estimate, moved, motions), estimate.memory)
+
+    def _add_noise(
+        self,
+        covariance: Array,
+        estimate: BatchEstimate,
+        motions: Motions,
+        by_input: tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]],
+    ) -> None:
+        """Add the process noise of a step to covariances, (runs, n, n), in place."""
+        config, dt_s = self.config, motions.dt_s
+        moves = ~motions.stands
+        for index, walk in enumerate(self._walk):
+            if walk > 0.0:
+                covariance[:, index, index] += walk * dt_s
+        covariance[:, SCALE, SCALE] += config.scale_walk**2 * np.abs(motions.distance_m)
+        covariance[:, TURN_SCALE, TURN_SCALE] += config.turn_scale_walk**2 * np.abs(
+            motions.turn_rad
+        )
+        for column, variance in zip(by_input, variances(config.motion, motions), strict=True):
+            weighed = np.where(moves, variance, 0.0)
+            for i in range(_POSE):
+                for j in range(_POSE):
+                    covariance[:, i, j] += weighed * column[i] * column[j]
+        doubts = moves & self._doubts(estimate)
+        if doubts.any():
+            place = np.where(doubts, config.doubt_std**2 * dt_s, 0.0)
+            covariance[:, X, X] += place
+            covariance[:, Y, Y] += place
+            covariance[:, HEADING, HEADING] += np.where(
+                doubts, config.doubt_turn_std**2 * dt_s, 0.0
+            )
+
+    def _doubts(self, estimate: BatchEstimate) -> Flags:
+        if not estimate.memory.shape[1]:
+            return np.zeros(len(estimate.mean), dtype=bool)
+        variance = estimate.covariance[:, X, X] + estimate.covariance[:, Y, Y]
+        short = estimate.memory.min(axis=1) <= -self.config.persistence
+        return np.asarray(short & (variance < self.config.doubt_limit**2))
+
+    def update_ranges(
+        self,
+        estimate: BatchEstimate,
+        anchor: int,
+        range_m: Array,
+        variance_m2: float,
+        nlos_probability: Array,
+    ) -> tuple[BatchEstimate, BatchInnovation]:
+        """Return the estimates corrected by a range each, all to one anchor.
+
+        Parameters
+        ----------
+        estimate : BatchEstimate
+        anchor : int
+            Index of the anchor.
+        range_m : ndarray, shape (runs,)
+            [m]; NaN where there is none: that run stays as it is.
+        variance_m2 : float
+            Of each range; 0 when not known.
+        nlos_probability : ndarray, shape (runs,)
+            NaN where not known.
+        """
+        config = self.config
+        there = np.isfinite(range_m)
+        expected, variance, cross = self._expect(estimate, anchor)
+        innovation = range_m - self._anchors[anchor].bias_m - expected
+        least = variance_m2 if variance_m2 > 0.0 else config.default_range_std**2
+        likely = np.where(nlos_probability > 0.0, nlos_probability, 0.0)  # NaN says nothing
+        noise = max(least, config.least_range_std**2) + (likely * config.nlos_std) ** 2
+        spread = variance + noise
+        nis = innovation * innovation / spread
+        deviations = np.where(there, innovation / np.sqrt(spread), 0.0)
+        before = estimate.memory[:, anchor]
+        persistent = before + config.persistence_share * (
+            np.clip(deviations, -CLIP, CLIP) - before
+        )
+        memory = estimate.memory.copy()
+        memory[:, anchor] = np.where(there, persistent, before)
+        accepted = there & (nis <= config.gate)
+        weighed = np.where(
+            nis > config.huber**2, spread * np.abs(deviations) / config.huber - variance, noise
+        )
+        long = (deviations > 0.0) & (persistent > config.persistence)
+        weighed += np.where(long, spread * persistent**2 * config.persistence_count, 0.0)
+        share = np.where(accepted, 1.0 / (variance + weighed), 0.0)
+        mean = estimate.mean + cross * (share * np.where(there, innovation, 0.0))[:, None]
+        mean[:, HEADING] = wrap(mean[:, HEADING])
+        gained = (cross * share[:, None])[:, :, None] * cross[:, None, :]
+        after = BatchEstimate(mean, estimate.covariance - gained, estimate.twist, memory)
+        return after, BatchInnovation(
+            innovation, np.where(there, spread, np.nan), nis, np.asarray(accepted)
+        )
+
+    def _expect(self, estimate: BatchEstimate, index: int) -> _Expected:
+        """Return what an anchor should read, linearised at the means; see `predict_range`."""
+        mean, anchor = estimate.mean, self._anchors[index].position
+        heading, delay = mean[:, HEADING], mean[:, RANGE_DELAY]
+        speed, turn_rate = estimate.twist[:, 0], estimate.twist[:, 1]
+        cos, sin = np.cos(heading), np.sin(heading)
+        angle = -turn_rate * delay
+        turned, across = np.cos(angle), np.sin(angle)
+        arm_x = turned * self._lever_arm[0] - across * self._lever_arm[1]
+        arm_y = across * self._lever_arm[0] + turned * self._lever_arm[1]
+        ahead = arm_x - speed * delay
+        tag_x, tag_y = cos * ahead - sin * arm_y, sin * ahead + cos * arm_y
+        dx, dy = mean[:, X] + tag_x - anchor[0], mean[:, Y] + tag_y - anchor[1]
+        distance = np.sqrt(dx * dx + dy * dy + (self._lever_arm[2] - anchor[2]) ** 2)
+        away = 1.0 / np.where(distance > NEAREST_M, distance, np.inf)
+        ux, uy = dx * away, dy * away
+        along, aside = speed - turn_rate * arm_y, turn_rate * arm_x
+        slopes = (
+            (X, ux),
+            (Y, uy),
+            (HEADING, uy * tag_x - ux * tag_y),
+            (
+                RANGE_DELAY,
+                -(ux * (cos * along - sin * aside) + uy * (sin * along + cos * aside)),
+            ),
+        )
+        bias = RANGE_BIAS + index
+        cross = estimate.covariance[:, :, bias].copy()
+        for column, slope in slopes:
+            cross += estimate.covariance[:, :, column] * slope[:, None]
+        variance = cross[:, bias].copy()
+        for column, slope in slopes:
+            variance += slope * cross[:, column]
+        return _Expected(distance + mean[:, bias], variance, cross)
+
+
+def _transport(covariance: Array, coupling: tuple[tuple[int, int, Array], ...]) -> Array:
+    """Return F P F' of every run, F the identity and what of it the coupling says.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (runs, n, n)
+    coupling : tuple of (row, column, ndarray of shape (runs,))
+        Rows are of the pose.
+    """
+    moved = covariance.copy()
+    for row, column, value in coupling:
+        moved[:, row] += value[:, None] * covariance[:, column]
+    corner = moved[:, :_POSE, :_POSE].copy()
+    for row, column, value in coupling:
+        corner[:, :, row] += value[:, None] * moved[:, :_POSE, column]
+    moved[:, _POSE:, :_POSE] = moved[:, :_POSE, _POSE:].swapaxes(1, 2)
+    moved[:, :_POSE, :_POSE] = 0.5 * (corner + corner.swapaxes(1, 2))
+    return moved
+
+
+def _twist(estimate: BatchEstimate, moved: Array, motions: Motions) -> Array:
+    """Return forward speed and turn rate of a step, (runs, 2), scale errors taken off."""
+    if motions.dt_s <= 0.0:
+        return estimate.twist
+    twist = np.empty_like(estimate.twist)
+    twist[:, 0] = (1.0 + moved[:, SCALE]) * motions.distance_m / motions.dt_s
+    turn = (1.0 + moved[:, TURN_SCALE]) * motions.turn_rad / motions.dt_s
+    twist[:, 1] = turn - moved[:, GYRO_BIAS]
+    twist[motions.stands] = 0.0
+    return twist

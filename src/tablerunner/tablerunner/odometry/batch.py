@@ -1,0 +1,161 @@
+"""Dead reckoning of many robots at once: `Odometer` over arrays.
+
+All runs share their stamps; arrays have time first and runs last. For recorded or simulated data
+that is known to be clean: nothing is refused here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tablerunner.odometry.gyro import GyroConfig
+from tablerunner.odometry.motion import MotionNoise
+from tablerunner.odometry.odometer import OdometerConfig
+from tablerunner.types import NANOSECONDS, nanoseconds
+
+Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Arc lengths [m] and turns [rad] of many robots, shape (runs,), over the same dt [s]."""
+
+    distance_m: Array
+    turn_rad: Array
+    dt_s: float
+
+    @property
+    def stands(self) -> NDArray[np.bool_]:
+        """Whose wheels did not move at all, shape (runs,)."""
+        return np.asarray((self.distance_m == 0.0) & (self.turn_rad == 0.0))
+
+
+def variances(noise: MotionNoise, motions: Motions) -> tuple[Array, Array]:
+    """Return `MotionNoise.variances` of every robot, shapes (runs,)."""
+    length, turn = np.abs(motions.distance_m), np.abs(motions.turn_rad)
+    return (
+        noise.distance**2 * length,
+        noise.heading_per_turn**2 * turn
+        + noise.heading_per_distance**2 * length
+        + noise.heading_per_time**2 * motions.dt_s,
+    )
+
+
+@dataclass(frozen=True)
+class BatchTrack:
+    """Odometry of many robots.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (k,)
+    place : ndarray, shape (k, 2, runs)
+        base_link in odom [m], from the origin.
+    length : ndarray, shape (k, runs)
+        Way since the start [m].
+    heading : ndarray, shape (k, runs)
+        In odom [rad], not wrapped.
+    """
+
+    stamps: Stamps
+    place: Array
+    length: Array
+    heading: Array
+
+    def motions(self, index: int) -> Motions:
+        """Return the motions of the step that ends with a stamp."""
+        return Motions(
+            self.length[index] - self.length[index - 1],
+            self.heading[index] - self.heading[index - 1],
+            float(self.stamps[index] - self.stamps[index - 1]) / NANOSECONDS,
+        )
+
+    def laid_on(self, start: tuple[float, float, float]) -> Array:
+        """Return the places in map, shape (k, 2, runs) [m], of robots that all began at a pose."""
+        cos, sin = np.cos(start[2]), np.sin(start[2])
+        x, y = self.place[:, 0], self.place[:, 1]
+        return np.stack([start[0] + cos * x - sin * y, start[1] + sin * x + cos * y], axis=1)
+
+
+def dead_reckon(
+    config: OdometerConfig, stamps: Stamps, wheels: Array, imu_stamps: Stamps, yaw_rate: Array
+) -> BatchTrack:
+    """Return the odometry of many robots.
+
+    Parameters
+    ----------
+    config : OdometerConfig
+    stamps : ndarray of int64, shape (k,)
+        Of the wheels.
+    wheels : ndarray, shape (k, 2, runs)
+        Angles of left and right wheel [rad].
+    imu_stamps : ndarray of int64, shape (i,)
+    yaw_rate : ndarray, shape (i, runs)
+        [rad/s]. Of an IMU sample and a wheel sample with one stamp, the wheels come first.
+    """
+    rolled = np.diff(wheels, axis=0) * config.wheels.wheel_radius
+    distance = 0.5 * (rolled[:, 0] + rolled[:, 1])
+    turn = (rolled[:, 1] - rolled[:, 0]) / config.wheels.track
+    if config.heading_source == 'gyro':
+        turn = _turns_by_gyro(config.gyro, stamps, distance, turn, imu_stamps, yaw_rate)
+    heading = np.concatenate([np.zeros_like(turn[:1]), np.cumsum(turn, axis=0)])
+    course = heading[:-1] + 0.5 * turn
+    steps = np.stack([distance * np.cos(course), distance * np.sin(course)], axis=1)
+    place = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
+    length = np.concatenate([np.zeros_like(turn[:1]), np.cumsum(distance, axis=0)])
+    return BatchTrack(stamps, place, length, heading)
+
+
+def _turns_by_gyro(
+    config: GyroConfig,
+    stamps: Stamps,
+    distance: Array,
+    turn: Array,
+    imu_stamps: Stamps,
+    yaw_rate: Array,
+) -> Array:
+    """Return the turn of every step, shape (k - 1, runs), by the gyroscope where it speaks."""
+    angle, alive = _angles(config, stamps, imu_stamps, yaw_rate)
+    stands = (distance == 0.0) & (turn == 0.0)
+    turns = turn.copy()
+    runs = turn.shape[1]
+    bias, learned, still = np.zeros(runs), np.zeros(runs), np.zeros(runs)
+    for step in range(len(turn)):
+        if not (alive[step] and alive[step + 1]):
+            still = np.zeros(runs)
+            continue
+        dt_s = float(stamps[step + 1] - stamps[step]) / NANOSECONDS
+        turned = angle[step + 1] - angle[step]
+        drift = turned - bias * dt_s
+        rests = stands[step] & (np.abs(drift) <= config.still_rate * dt_s)
+        still = np.where(rests, still + dt_s, 0.0)
+        learns = rests & (still > config.still_time)
+        turns[step] = np.where(learns, turn[step], drift)
+        if learns.any():
+            longer = np.minimum(learned + dt_s, config.bias_time_constant)
+            learned = np.where(learns, longer, learned)
+            share = np.minimum(1.0, dt_s / np.maximum(learned, 1e-12))
+            bias = np.where(learns, bias + (turned / dt_s - bias) * share, bias)
+    return turns
+
+
+def _angles(
+    config: GyroConfig, stamps: Stamps, imu_stamps: Stamps, yaw_rate: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the integral of the yaw rate at each stamp, (k, runs), and where it is fresh, (k,).
+
+    The trapezoid between samples, the last rate held beyond the newest.
+    """
+    timeout = nanoseconds(config.timeout)
+    gaps = np.diff(imu_stamps)
+    steps = 0.5 * (yaw_rate[1:] + yaw_rate[:-1]) * (gaps / NANOSECONDS)[:, None]
+    steps[gaps > timeout] = 0.0
+    summed = np.concatenate([np.zeros_like(yaw_rate[:1]), np.cumsum(steps, axis=0)])
+    newest = np.searchsorted(imu_stamps, stamps, side='left') - 1
+    known = np.maximum(newest, 0)
+    ahead = stamps - imu_stamps[known]
+    held = summed[known] + yaw_rate[known] * (ahead / NANOSECONDS)[:, None]
+    return held, np.asarray((newest >= 0) & (ahead <= timeout))
