@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from tablerunner.geometry.pose import Pose2
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+
+_NO_VECTOR: Vector = np.empty(0)
+_NO_MATRIX: Matrix = np.empty((0, 0))
 
 NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second."""
@@ -184,6 +188,8 @@ class Estimate:
     stamp: int
     mean: Vector  # (n,)
     covariance: Matrix  # (n, n)
+    twist: tuple[float, float] = (0.0, 0.0)  # forward [m/s] and turn rate [rad/s], last step
+    memory: tuple[float, ...] = ()  # running statistics that the estimator keeps for itself
 
     @property
     def pose(self) -> Pose2:
@@ -206,8 +212,7 @@ class Refusal:
     reason: str  # a short phrase that stays the same for the same cause, so that it can be counted
 
 
-@dataclass(frozen=True, slots=True)
-class Innovation:
+class Innovation(NamedTuple):
     """What one measurement did to the estimate, or why it was refused."""
 
     stamp: int
@@ -215,8 +220,8 @@ class Innovation:
     key: str  # which of that source: an anchor id; may be empty
     accepted: bool
     reason: str  # empty when accepted plainly
-    innovation: Vector = field(default_factory=lambda: np.empty(0))
-    covariance: Matrix = field(default_factory=lambda: np.empty((0, 0)))  # S
+    innovation: Vector = _NO_VECTOR
+    covariance: Matrix = _NO_MATRIX  # S
     nis: float = float('nan')
     gate: float = float('nan')
     considered: bool = True  # false: not compared with the estimate, so it says nothing about it

@@ -17,9 +17,7 @@ def reproduce(
     name: Annotated[
         str, typer.Argument(metavar='NAME', help='Which experiment; without it they are listed.')
     ] = '',
-    seeds: Annotated[
-        int, typer.Option(metavar='N', min=1, help='How many seeds to run.')
-    ] = 20,
+    seeds: Annotated[int, typer.Option(metavar='N', min=1, help='How many seeds to run.')] = 20,
     first_seed: Annotated[
         int, typer.Option('--seed', metavar='N', min=0, help='The first of the seeds.')
     ] = 0,

@@ -1,7 +1,6 @@
 """Dynamic dimension fusion (Liu et al. 2023): positions correct what the motion lets them.
 
-State: x, y, heading, scale error and rate bias as in the `ekf`, without range biases; then the
-last speed and turn rate, which choose the dimension:
+State: as in the `ekf`, without range biases. Speed and turn rate choose the dimension:
 
 - straight on (fast, hardly turning): one, across the heading. The correction reaches the heading
   through its correlation with the place; the distance is left to the wheels.
@@ -28,8 +27,6 @@ from tablerunner.estimation.models.state import BASE_NAMES, SCALE
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import Anchor, Estimate, Innovation, RangeSample
 
-_KEPT = len(BASE_NAMES)
-
 
 class Dimension(Enum):
     """How many directions of a position are used."""
@@ -44,31 +41,29 @@ class Ddf:
 
     name = 'ddf'
     takes_positions = True
-    state_names = (*BASE_NAMES, 'speed', 'turn_rate')
+    state_names = BASE_NAMES
 
     def __init__(
-        self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
+        self,
+        config: EstimatorConfig,
+        anchors: tuple[Anchor, ...],  # noqa: ARG002 - all estimators are made alike
+        lever_arm: Point3,
     ) -> None:
         self.config = config
         self._filter = Ekf(config, (), lever_arm)
 
     def start(self, start: Start) -> Estimate:
         """Return the first estimate; errors as for `Ekf.start`."""
-        pose = Start(start.stamp, start.pose, start.pose_covariance)
-        return _with_motion(self._filter.start(pose), 0.0, 0.0)
+        return self._filter.start(Start(start.stamp, start.pose, start.pose_covariance))
 
     def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
         """Return the estimate carried to `stamp` by a motion."""
-        speed, turn_rate = estimate.mean[_KEPT:].tolist()
-        if motion.dt_s > 0.0:
-            speed, turn_rate = motion.distance_m / motion.dt_s, motion.turn_rad / motion.dt_s
-        moved = self._filter.predict(_without_motion(estimate), motion, stamp)
-        return _with_motion(moved, speed, turn_rate)
+        return self._filter.predict(estimate, motion, stamp)
 
     def dimension(self, estimate: Estimate) -> Dimension:
         """Return how many directions of a position would now be used."""
         config = self.config.ddf
-        speed, turn_rate = (abs(value) for value in estimate.mean[_KEPT:].tolist())
+        speed, turn_rate = (abs(value) for value in estimate.twist)
         if speed > config.straight_speed and turn_rate < config.straight_turn_rate:
             return Dimension.ACROSS
         if speed < config.turn_speed and turn_rate > config.turn_rate:
@@ -82,24 +77,26 @@ class Ddf:
         dimension = self.dimension(estimate)
         if dimension is Dimension.NONE:
             return no_use(estimate, measurement, 'neither straight on nor in a turn')
-        place, slope = predict_position(estimate.mean[:_KEPT], measurement.point)
+        place, slope = predict_position(estimate.mean, measurement.point)
         innovation = np.array([measurement.pose.x, measurement.pose.y]) - place
         noise = measurement.covariance[:2, :2] + np.eye(2) * self.config.ddf.position_std**2
         if dimension is Dimension.ACROSS:
             heading = float(estimate.mean[2])
             across = np.array([[-math.sin(heading), math.cos(heading)]])
-            innovation, slope, noise = across @ innovation, across @ slope, across @ noise @ across.T
-        before = _without_motion(estimate)
-        seen = expect(before.covariance, innovation, slope, noise)
+            innovation, slope, noise = (
+                across @ innovation,
+                across @ slope,
+                across @ noise @ across.T,
+            )
+        seen = expect(estimate.covariance, innovation, slope, noise)
         gate = self.config.ddf.gate
         accepted = seen.nis <= gate
         after = estimate
         if accepted:
-            corrected = correct(before, seen, measurement.stamp)
+            after = correct(estimate, seen, measurement.stamp)
             if dimension is Dimension.ACROSS:
                 # What lies across says nothing of how far the wheels went.
-                corrected.mean[SCALE] = before.mean[SCALE]
-            after = _with_motion(corrected, *estimate.mean[_KEPT:].tolist())
+                after.mean[SCALE] = estimate.mean[SCALE]
         return after, Innovation(
             measurement.stamp,
             measurement.source,
@@ -111,13 +108,3 @@ class Ddf:
             seen.nis,
             gate,
         )
-
-
-def _with_motion(estimate: Estimate, speed: float, turn_rate: float) -> Estimate:
-    covariance = np.zeros((_KEPT + 2, _KEPT + 2))
-    covariance[:_KEPT, :_KEPT] = estimate.covariance
-    return Estimate(estimate.stamp, np.array([*estimate.mean, speed, turn_rate]), covariance)
-
-
-def _without_motion(estimate: Estimate) -> Estimate:
-    return Estimate(estimate.stamp, estimate.mean[:_KEPT], estimate.covariance[:_KEPT, :_KEPT])

@@ -1,9 +1,18 @@
 """The default estimator: an extended Kalman filter on ranges with self-calibration.
 
-State: x, y, heading, scale error of the wheels, bias of the yaw rate, range bias of each anchor
-(`models.state`). The biases start with one common part and one of each anchor's own, so that the
-filter learns both from what the geometry shows and holds what it does not: an unobservable
-combination simply keeps its prior covariance.
+State: x, y, heading, scale errors of distances and turns, bias of the yaw rate, delay of the
+ranges' stamps, range bias of each anchor (`models.state`). The range biases start with one common
+part and one of each anchor's own, so that the filter learns both from what the geometry shows and
+holds what it does not: an unobservable combination simply keeps its prior covariance.
+
+What blocks the way makes a range longer, never shorter. So
+
+- an anchor that has read long for a while is believed less and less: its errors are of one piece;
+- an anchor that has read short for a while speaks against the pose itself: odometry has failed
+  (wheels spin, the robot was pushed), and the pose is doubted until the ranges agree again.
+
+Each anchor's mean innovation is kept in `Estimate.memory`, so that an update stays a pure
+function and late data can be put in their place.
 """
 
 from __future__ import annotations
@@ -21,14 +30,18 @@ from tablerunner.estimation.estimator import (
     Measurement,
     Start,
 )
-from tablerunner.estimation.models.motion_model import move, transport
+from tablerunner.estimation.models.motion_model import input_noise, move, transport
 from tablerunner.estimation.models.position_model import predict_position
-from tablerunner.estimation.models.range_model import Point3, predict_range
+from tablerunner.estimation.models.range_model import STANDING, Point3, predict_range
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
     HEADING,
     RANGE_BIAS,
+    RANGE_DELAY,
     SCALE,
+    TURN_SCALE,
+    X,
+    Y,
     state_names,
 )
 from tablerunner.geometry.angles import wrap
@@ -43,6 +56,10 @@ from tablerunner.types import (
     Vector,
 )
 
+CLIP = 4.0
+"""One wild reading does not make an anchor's mean [standard deviations]."""
+
+
 def bias_covariance(config: EstimatorConfig, count: int) -> Matrix:
     """Return the prior covariance of the range biases, shape (count, count)."""
     common = np.full((count, count), config.range_bias_common_std**2)
@@ -52,19 +69,19 @@ def bias_covariance(config: EstimatorConfig, count: int) -> Matrix:
 def range_variance(config: EstimatorConfig, sample: RangeSample) -> float:
     """Return the variance of a range [m^2], with what NLOS may add to it."""
     variance = sample.variance_m2 if sample.variance_m2 > 0.0 else config.default_range_std**2
+    variance = max(variance, config.least_range_std**2)
     probability = sample.nlos_probability
     if probability > 0.0:  # false for NaN
         variance += (probability * config.nlos_std) ** 2
     return variance
 
 
-class ExpectedRange(NamedTuple):
+class Expected(NamedTuple):
     """What an anchor should read."""
 
     range_m: float
     variance: float  # [m^2], from the state's
     cross: Vector  # (n,), covariance of state and range
-    slope: Vector  # (n,), d(range)/d(state)
 
 
 class Ekf:
@@ -81,9 +98,12 @@ class Ekf:
         self.state_names = state_names(tuple(anchor.anchor_id for anchor in anchors))
         self._anchors = {anchor.anchor_id: (i, anchor) for i, anchor in enumerate(anchors)}
         self._size = RANGE_BIAS + len(anchors)
-        self._walk_per_time = np.zeros(self._size)
-        self._walk_per_time[GYRO_BIAS] = config.gyro_bias_walk**2
-        self._walk_per_time[RANGE_BIAS:] = config.range_bias_walk**2
+        self._calm = (0.0,) * len(anchors)
+        walk = np.zeros(self._size)
+        walk[GYRO_BIAS] = config.gyro_bias_walk**2
+        walk[RANGE_DELAY] = config.range_delay_walk**2
+        walk[RANGE_BIAS:] = config.range_bias_walk**2
+        self._walk = np.diag(walk)  # for each second
 
     def start(self, start: Start) -> Estimate:
         """Return the first estimate: the given pose, all else at its prior.
@@ -98,8 +118,13 @@ class Ekf:
         mean[:3] = start.pose
         mean[HEADING] = wrap(float(start.pose[2]))
         covariance = np.zeros((self._size, self._size))
-        covariance[SCALE, SCALE] = config.scale_std**2
-        covariance[GYRO_BIAS, GYRO_BIAS] = config.gyro_bias_std**2
+        for index, deviation in (
+            (SCALE, config.scale_std),
+            (TURN_SCALE, config.turn_scale_std),
+            (GYRO_BIAS, config.gyro_bias_std),
+            (RANGE_DELAY, config.range_delay_std),
+        ):
+            covariance[index, index] = deviation**2
         if start.range_biases is not None and start.covariance is not None:
             mean[RANGE_BIAS:] = start.range_biases
             rows = np.r_[0:3, RANGE_BIAS : RANGE_BIAS + count]
@@ -108,17 +133,40 @@ class Ekf:
             covariance[:3, :3] = start.pose_covariance
             covariance[RANGE_BIAS:, RANGE_BIAS:] = bias_covariance(config, count)
         _require_covariance(covariance)
-        return Estimate(start.stamp, mean, covariance)
+        return Estimate(start.stamp, mean, covariance, memory=self._calm)
 
     def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
         """Return the estimate carried to `stamp` by a motion."""
-        moved, coupling, by_input = move(estimate.mean, motion)
-        noise = (by_input * self.config.motion.variances(motion)) @ by_input.T
-        covariance = transport(estimate.covariance, coupling, noise)
-        walk = self._walk_per_time * motion.dt_s
-        walk[SCALE] = self.config.scale_walk**2 * abs(motion.distance_m)
-        covariance.reshape(-1)[:: self._size + 1] += walk
-        return Estimate(stamp, moved, covariance)
+        moved, by_state, by_input = move(estimate.mean, motion)
+        noise = self._noise(estimate, motion, by_input)
+        covariance = transport(estimate.covariance, by_state, noise)
+        return Estimate(
+            stamp, moved, covariance, twist_of(estimate, moved, motion), estimate.memory
+        )
+
+    def _noise(self, estimate: Estimate, motion: Motion, by_input: tuple[float, ...]) -> Matrix:
+        """Return the process noise of a step, (n, n)."""
+        config, dt_s = self.config, motion.dt_s
+        noise: Matrix = self._walk * dt_s
+        distance, turn = motion.distance_m, motion.turn_rad
+        if distance == 0.0 and turn == 0.0:
+            return noise  # wheels that stand are known to stand
+        noise[SCALE, SCALE] = config.scale_walk**2 * abs(distance)
+        noise[TURN_SCALE, TURN_SCALE] = config.turn_scale_walk**2 * abs(turn)
+        input_noise(noise, by_input, *config.motion.variances(motion))
+        if self._doubts(estimate):
+            doubt = config.doubt_std**2 * dt_s
+            noise[X, X] += doubt
+            noise[Y, Y] += doubt
+            noise[HEADING, HEADING] += config.doubt_turn_std**2 * dt_s
+        return noise
+
+    def _doubts(self, estimate: Estimate) -> bool:
+        """Whether an anchor has read short for so long that the pose must be wrong."""
+        if not estimate.memory or min(estimate.memory) > -self.config.persistence:
+            return False
+        variance = estimate.covariance
+        return float(variance[X, X] + variance[Y, Y]) < self.config.doubt_limit**2
 
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a range or a pose, and what happened."""
@@ -131,26 +179,44 @@ class Ekf:
     ) -> tuple[Estimate, Innovation]:
         config = self.config
         index, anchor = self._anchors[sample.anchor_id]
-        expected = self._expect(estimate, anchor, index)
-        innovation = sample.range_m - anchor.bias_m - expected.range_m
+        expected, variance, cross = self._expect(estimate, anchor, index)
+        innovation = sample.range_m - anchor.bias_m - expected
         noise = range_variance(config, sample)
-        spread = expected.variance + noise
+        spread = variance + noise
         nis = innovation * innovation / spread
-        accepted = nis <= config.gate
-        reason = '' if accepted else 'beyond the gate'
-        after = estimate
+        deviations = innovation / math.sqrt(spread)
+        memory = estimate.memory
+        before = memory[index]
+        clipped = min(max(deviations, -CLIP), CLIP)
+        persistent = before + config.persistence_share * (clipped - before)
+        memory = (*memory[:index], persistent, *memory[index + 1 :])
+        accepted, reason = nis <= config.gate, ''
         if accepted:
+            weighed = noise
             if nis > config.huber**2:
                 # Huber: beyond the knee the pull stays constant, as if the noise were larger.
-                noise = spread * math.sqrt(nis) / config.huber - expected.variance
+                weighed = spread * abs(deviations) / config.huber - variance
                 reason = 'weight reduced'
-            gain = expected.cross / (expected.variance + noise)
-            mean = estimate.mean + gain * innovation
-            mean[HEADING] = wrap(float(mean[HEADING]))
-            covariance = self._corrected(estimate.covariance, gain, noise, expected)
-            covariance = covariance + covariance.T
-            covariance *= 0.5
-            after = Estimate(sample.stamp, mean, covariance)
+            if deviations > 0.0 and persistent > config.persistence:
+                # Long for a while: so many readings share one error, and tell as little as one.
+                weighed += spread * persistent * persistent * config.persistence_count
+                reason = 'long for a while'
+            weighed_spread = variance + weighed
+            mean = estimate.mean + cross * (innovation / weighed_spread)
+            if not -math.pi < mean[HEADING] <= math.pi:
+                mean[HEADING] = wrap(float(mean[HEADING]))
+            after = Estimate(
+                sample.stamp,
+                mean,
+                self._corrected(estimate.covariance, cross, weighed_spread),
+                estimate.twist,
+                memory,
+            )
+        else:
+            reason = 'beyond the gate'
+            after = Estimate(
+                estimate.stamp, estimate.mean, estimate.covariance, estimate.twist, memory
+            )
         return after, Innovation(
             sample.stamp,
             RANGE_SOURCE,
@@ -163,26 +229,27 @@ class Ekf:
             config.gate,
         )
 
-    def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> ExpectedRange:
+    def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> Expected:
         """Return what an anchor should read, linearised at the mean.
 
-        A filter that spreads points instead overrides this and `_corrected`.
+        A filter that spreads points instead overrides this.
         """
-        expected, jacobian = predict_range(estimate.mean, anchor.position, self.lever_arm, index)
-        projected = estimate.covariance @ jacobian
-        return ExpectedRange(expected, float(jacobian @ projected), projected, jacobian)
+        expected, jacobian = predict_range(
+            estimate.mean, anchor.position, self.lever_arm, index, estimate.twist
+        )
+        cross = estimate.covariance.dot(jacobian)
+        return Expected(expected, float(jacobian.dot(cross)), cross)
 
-    def _corrected(
-        self, covariance: Matrix, gain: Vector, noise: float, expected: ExpectedRange
-    ) -> Matrix:
-        """Return the covariance after a range, in Joseph's form (Sun 32).
+    @staticmethod
+    def _corrected(covariance: Matrix, cross: Vector, spread: float) -> Matrix:
+        """Return the covariance after a range, P - c c'/s, symmetric to the last bit.
 
-        (I - K H) P (I - K H)' + K R K' with its products of rank one written out: with
-        A = P - K (H P), the rest is A - (A H' - K R) K'.
+        For the gain c/s of a single number, Joseph's form (Sun 32) is this very matrix; `spread`
+        is never smaller than the variance that it takes away by less than the least noise.
         """
-        half = covariance - gain[:, None] * expected.cross
-        half -= (half @ expected.slope - gain * noise)[:, None] * gain
-        return half
+        root = cross * (1.0 / math.sqrt(spread))
+        # As a product of matrices: half the time of an outer product by broadcasting.
+        return np.asarray(covariance - root.reshape(-1, 1).dot(root.reshape(1, -1)))
 
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.
@@ -209,6 +276,19 @@ class Ekf:
             seen.nis,
             self.config.pose_gate,
         )
+
+
+def twist_of(estimate: Estimate, moved: Vector, motion: Motion) -> tuple[float, float]:
+    """Return forward speed [m/s] and turn rate [rad/s] of a step, scale errors taken off."""
+    if motion.dt_s <= 0.0:
+        return estimate.twist
+    if motion.distance_m == 0.0 and motion.turn_rad == 0.0:
+        return STANDING
+    turn = (1.0 + float(moved[TURN_SCALE])) * motion.turn_rad / motion.dt_s
+    return (
+        (1.0 + float(moved[SCALE])) * motion.distance_m / motion.dt_s,
+        turn - float(moved[GYRO_BIAS]),
+    )
 
 
 def _require_covariance(covariance: Matrix) -> None:

@@ -139,6 +139,20 @@ class EstimatorConfig(Config):
         high=0.1,
         dynamic=True,
     )
+    turn_scale_std: float = parameter(
+        0.005,
+        description='Prior deviation of the scale error of turns',
+        low=0.0,
+        high=0.5,
+    )
+    turn_scale_walk: float = parameter(
+        1e-4,
+        unit='1/sqrt(rad)',
+        description='Random walk of the scale error of turns',
+        low=0.0,
+        high=0.1,
+        dynamic=True,
+    )
     gyro_bias_std: float = parameter(
         0.01,
         unit='rad/s',
@@ -150,6 +164,21 @@ class EstimatorConfig(Config):
         2e-4,
         unit='rad/s/sqrt(s)',
         description='Random walk of the yaw rate bias',
+        low=0.0,
+        high=0.1,
+        dynamic=True,
+    )
+    range_delay_std: float = parameter(
+        0.01,
+        unit='s',
+        description='Prior deviation of the delay of the stamps of ranges',
+        low=0.0,
+        high=1.0,
+    )
+    range_delay_walk: float = parameter(
+        1e-4,
+        unit='s/sqrt(s)',
+        description='Random walk of that delay: clocks drift',
         low=0.0,
         high=0.1,
         dynamic=True,
@@ -184,6 +213,14 @@ class EstimatorConfig(Config):
         high=5.0,
         dynamic=True,
     )
+    least_range_std: float = parameter(
+        0.005,
+        unit='m',
+        description='No range is believed to be better than this, whatever its message says',
+        above=0.0,
+        high=1.0,
+        dynamic=True,
+    )
     nlos_std: float = parameter(
         3.0,
         unit='m',
@@ -199,6 +236,54 @@ class EstimatorConfig(Config):
         description='Innovation in standard deviations beyond which it loses weight',
         above=0.0,
         high=100.0,
+        dynamic=True,
+    )
+    persistence: float = parameter(
+        1.2,
+        description=(
+            'Mean innovation of an anchor, in standard deviations, beyond which it has been long '
+            'or short for too long to be chance'
+        ),
+        above=0.0,
+        high=4.0,
+        dynamic=True,
+    )
+    persistence_share: float = parameter(
+        0.15,
+        description='Share of one range in that mean',
+        above=0.0,
+        high=1.0,
+        dynamic=True,
+    )
+    persistence_count: float = parameter(
+        20.0,
+        description='How many ranges of an anchor that is long for a while tell as much as one',
+        low=0.0,
+        high=1000.0,
+        dynamic=True,
+    )
+    doubt_std: float = parameter(
+        0.3,
+        unit='m/sqrt(s)',
+        description='Noise of the place while anchors that are short for a while speak against it',
+        low=0.0,
+        high=10.0,
+        dynamic=True,
+    )
+    doubt_turn_std: float = parameter(
+        0.1,
+        unit='rad/sqrt(s)',
+        description='The same of the heading',
+        low=0.0,
+        high=10.0,
+        dynamic=True,
+    )
+    doubt_limit: float = parameter(
+        0.5,
+        unit='m',
+        description='Deviation of the place up to which it is doubted further',
+        above=0.0,
+        high=10.0,
         dynamic=True,
     )
     gate: float = parameter(
@@ -225,9 +310,7 @@ def no_use(
     """Return the estimate as it is, and a refusal for a reason that is no gate's."""
     source = RANGE_SOURCE if isinstance(measurement, RangeSample) else measurement.source
     key = measurement.anchor_id if isinstance(measurement, RangeSample) else ''
-    return estimate, Innovation(
-        measurement.stamp, source, key, False, reason, considered=False
-    )
+    return estimate, Innovation(measurement.stamp, source, key, False, reason, considered=False)
 
 
 class Estimator(Protocol):

@@ -68,7 +68,10 @@ class Kf:
     state_names = STATE_NAMES
 
     def __init__(
-        self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
+        self,
+        config: EstimatorConfig,
+        anchors: tuple[Anchor, ...],  # noqa: ARG002 - all estimators are made alike
+        lever_arm: Point3,  # noqa: ARG002
     ) -> None:
         self.config = config
 

@@ -23,6 +23,7 @@ class OdometryTrack:
         self._stamps: list[int] = []
         self._lengths: list[float] = []  # [m], signed, from the oldest sample ever
         self._headings: list[float] = []  # [rad], not wrapped
+        self._spreads: list[float] = []  # [m^2], variance of the length as odometry tells it
 
     def __len__(self) -> int:
         return len(self._stamps)
@@ -56,31 +57,45 @@ class OdometryTrack:
         if not self._stamps:
             self._lengths.append(0.0)
             self._headings.append(sample.pose.heading)
+            self._spreads.append(0.0)
         insort(self._samples, sample, key=_stamp)
         insort(self._stamps, sample.stamp)
         first = bisect_left(self._stamps, sample.stamp)
         if first == 0 and len(self._stamps) > 1:
             raise ValueError('a sample older than the whole track has no place in it')
-        del self._lengths[max(first, 1) :]
-        del self._headings[max(first, 1) :]
+        for values in (self._lengths, self._headings, self._spreads):
+            del values[max(first, 1) :]
         for index in range(max(first, 1), len(self._stamps)):
             start, end = self._samples[index - 1], self._samples[index]
             step = between_poses(start.pose, end.pose, 0.0)
             self._lengths.append(self._lengths[-1] + step.distance_m)
             self._headings.append(self._headings[-1] + step.turn_rad)
+            told = _told_variance(end, seconds(end.stamp - start.stamp))
+            self._spreads.append(self._spreads[-1] + told)
 
     def trim(self, stamp: int) -> None:
         """Drop what is not needed for instants from `stamp` on."""
         drop = bisect_right(self._stamps, stamp) - 1
         if drop > 0:
-            for values in (self._samples, self._stamps, self._lengths, self._headings):
+            for values in (
+                self._samples,
+                self._stamps,
+                self._lengths,
+                self._headings,
+                self._spreads,
+            ):
                 del values[:drop]
 
     def motion(self, start: int, end: int) -> Motion:
         """Return the motion between two instants [ns], both in or after the track."""
-        length_a, heading_a = self._at(start)
-        length_b, heading_b = self._at(end)
-        return Motion(length_b - length_a, heading_b - heading_a, seconds(end - start))
+        length_a, heading_a, spread_a = self._at(start)
+        length_b, heading_b, spread_b = self._at(end)
+        return Motion(
+            length_b - length_a,
+            heading_b - heading_a,
+            seconds(end - start),
+            max(spread_b - spread_a, 0.0),
+        )
 
     def pose(self, stamp: int) -> Pose2:
         """Return the pose of base_link in odom at an instant."""
@@ -90,7 +105,7 @@ class OdometryTrack:
             return sample.pose
         return advance(sample.pose, self.motion(sample.stamp, stamp))
 
-    def _at(self, stamp: int) -> tuple[float, float]:
+    def _at(self, stamp: int) -> tuple[float, float, float]:
         stamps = self._stamps
         index = bisect_right(stamps, stamp) - 1
         if index == len(stamps) - 1:
@@ -99,14 +114,23 @@ class OdometryTrack:
             return (
                 self._lengths[-1] + sample.linear_m_s * ahead,
                 self._headings[-1] + sample.angular_rad_s * ahead,
+                self._spreads[-1] + _told_variance(sample, ahead),
             )
         index = max(index, 0)
         share = (stamp - stamps[index]) / (stamps[index + 1] - stamps[index])
         length, heading = self._lengths[index], self._headings[index]
+        spread = self._spreads[index]
         return (
             length + share * (self._lengths[index + 1] - length),
             heading + share * (self._headings[index + 1] - heading),
+            spread + share * (self._spreads[index + 1] - spread),
         )
+
+
+def _told_variance(sample: OdometrySample, dt_s: float) -> float:
+    """Return what odometry says of the distance of a step that ends with a sample [m^2]."""
+    variance = float(sample.twist_covariance[0, 0])
+    return variance * dt_s * dt_s if math.isfinite(variance) and variance > 0.0 else 0.0
 
 
 def plausible(start: OdometrySample, end: OdometrySample, speed: float, turn_rate: float) -> bool:

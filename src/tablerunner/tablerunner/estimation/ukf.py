@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 from filterpy.kalman import MerweScaledSigmaPoints
 
-from tablerunner.estimation.ekf import Ekf, ExpectedRange
+from tablerunner.estimation.ekf import Ekf, Expected, twist_of
 from tablerunner.estimation.estimator import EstimatorConfig
 from tablerunner.estimation.models.motion_model import move, move_many
 from tablerunner.estimation.models.range_model import Point3, predict_range_many
-from tablerunner.estimation.models.state import HEADING, SCALE
+from tablerunner.estimation.models.state import HEADING
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Matrix, Vector
+from tablerunner.types import Anchor, Estimate, Matrix
 
 
 class Ukf(Ekf):
@@ -41,27 +41,18 @@ class Ukf(Ekf):
         mean = self._points.Wm @ moved
         offset = moved - mean
         covariance = (self._points.Wc[:, None] * offset).T @ offset
-        _, _, by_input = move(estimate.mean, motion)
-        covariance[:3, :3] += (by_input * self.config.motion.variances(motion)) @ by_input.T
-        walk = self._walk_per_time * motion.dt_s
-        walk[SCALE] = self.config.scale_walk**2 * abs(motion.distance_m)
-        covariance.flat[:: self._size + 1] += walk
+        covariance += self._noise(estimate, motion, move(estimate.mean, motion).by_input)
         mean[HEADING] = wrap(float(mean[HEADING]))
-        return Estimate(stamp, mean, 0.5 * (covariance + covariance.T))
+        covariance = 0.5 * (covariance + covariance.T)
+        return Estimate(stamp, mean, covariance, twist_of(estimate, mean, motion), estimate.memory)
 
-    def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> ExpectedRange:
+    def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> Expected:
         points = self._spread(estimate)
-        ranges = predict_range_many(points, anchor.position, self.lever_arm, index)
+        ranges = predict_range_many(points, anchor.position, self.lever_arm, index, estimate.twist)
         expected = float(self._points.Wm @ ranges)
         weighted = self._points.Wc * (ranges - expected)
         cross = weighted @ (points - estimate.mean)
-        # No slope: `_corrected` needs none.
-        return ExpectedRange(expected, float(weighted @ (ranges - expected)), cross, cross)
-
-    def _corrected(
-        self, covariance: Matrix, gain: Vector, noise: float, expected: ExpectedRange
-    ) -> Matrix:
-        return np.asarray(covariance - (gain * (expected.variance + noise))[:, None] * gain)
+        return Expected(expected, float(weighted @ (ranges - expected)), cross)
 
     def _spread(self, estimate: Estimate) -> Matrix:
         """Return the sigma points, shape (2 n + 1, n); headings not wrapped."""

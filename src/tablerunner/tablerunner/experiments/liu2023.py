@@ -160,8 +160,8 @@ def run_liu2023(seeds: Sequence[int], progress: Progress) -> Outcome:
             'of the one robot, were chosen to match the raw rows, the same for all seeds.',
             'The largest raw error of the paper, 16.9 m, is a single outlier that these walls do '
             'not make; no bound is set on it.',
-            'The RMSE that the paper prints for UKF and DDF is less than its mean, which no series '
-            'of errors can have: compare mean and maximum.',
+            'The RMSE that the paper prints for UKF and DDF is less than its mean, which no '
+            'series of errors can have: compare mean and maximum.',
             'ukf and ddf know blocked ranges as the paper does, by how they jump (12-13). ekf '
             'knows them by the signal powers (its default), which the simulation makes clearer '
             'than a radio does, and takes the ranges as calibrated; so does ukf.',

@@ -138,8 +138,8 @@ def run_sun2019(seeds: Sequence[int], progress: Progress) -> Outcome:
             'wheel radius that odometry is told, over the true one': RADIUS_FACTOR,
         },
         (
-            'Bounds are on the mean over seeds of the largest error of a run (ekf: on the median); '
-            'the paper has three runs of situation I and two of II.',
+            'Bounds are on the mean over seeds of the largest error of a run (ekf: on the '
+            'median); the paper has three runs of situation I and two of II.',
             'UWB is the chain of the paper: double-sided ranging, a constant off ranges of poor '
             'signal (37), slant to plane, three circles (16-17).',
             'Chosen to match the raw rows, the same for all seeds: noise of ranges, excess behind '

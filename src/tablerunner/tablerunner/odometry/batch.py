@@ -22,11 +22,15 @@ Stamps = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Motions:
-    """Arc lengths [m] and turns [rad] of many robots, shape (runs,), over the same dt [s]."""
+    """Arc lengths [m] and turns [rad] of many robots, shape (runs,), over the same dt [s].
+
+    `told_variance` is what odometry itself says of the arc lengths [m^2], as in `Motion`.
+    """
 
     distance_m: Array
     turn_rad: Array
     dt_s: float
+    told_variance: Array
 
     @property
     def stands(self) -> NDArray[np.bool_]:
@@ -37,8 +41,9 @@ class Motions:
 def variances(noise: MotionNoise, motions: Motions) -> tuple[Array, Array]:
     """Return `MotionNoise.variances` of every robot, shapes (runs,)."""
     length, turn = np.abs(motions.distance_m), np.abs(motions.turn_rad)
+    distance = noise.distance**2 * length
     return (
-        noise.distance**2 * length,
+        np.maximum(distance, np.minimum(motions.told_variance, length**2)),
         noise.heading_per_turn**2 * turn
         + noise.heading_per_distance**2 * length
         + noise.heading_per_time**2 * motions.dt_s,
@@ -58,12 +63,15 @@ class BatchTrack:
         Way since the start [m].
     heading : ndarray, shape (k, runs)
         In odom [rad], not wrapped.
+    told_variance : ndarray, shape (k, runs)
+        Of `length`, as odometry tells it [m^2].
     """
 
     stamps: Stamps
     place: Array
     length: Array
     heading: Array
+    told_variance: Array
 
     def motions(self, index: int) -> Motions:
         """Return the motions of the step that ends with a stamp."""
@@ -71,6 +79,7 @@ class BatchTrack:
             self.length[index] - self.length[index - 1],
             self.heading[index] - self.heading[index - 1],
             float(self.stamps[index] - self.stamps[index - 1]) / NANOSECONDS,
+            self.told_variance[index] - self.told_variance[index - 1],
         )
 
     def laid_on(self, start: tuple[float, float, float]) -> Array:
@@ -106,7 +115,9 @@ def dead_reckon(
     steps = np.stack([distance * np.cos(course), distance * np.sin(course)], axis=1)
     place = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
     length = np.concatenate([np.zeros_like(turn[:1]), np.cumsum(distance, axis=0)])
-    return BatchTrack(stamps, place, length, heading)
+    told = np.cumsum(config.noise.distance**2 * np.abs(distance), axis=0)
+    told = np.concatenate([np.zeros_like(turn[:1]), told])
+    return BatchTrack(stamps, place, length, heading, told)
 
 
 def _turns_by_gyro(

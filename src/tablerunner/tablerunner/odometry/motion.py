@@ -18,11 +18,16 @@ from tablerunner.geometry.pose import Pose2
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Arc length [m], forward positive, and turn [rad], counter-clockwise, over dt [s]."""
+    """Arc length [m], forward positive, and turn [rad], counter-clockwise, over dt [s].
+
+    `told_variance` is what odometry itself says of the arc length [m^2]: more than usual where
+    wheels slip.
+    """
 
     distance_m: float
     turn_rad: float
     dt_s: float
+    told_variance: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -63,11 +68,18 @@ class MotionNoise(Config):
     )
 
     def variances(self, motion: Motion) -> tuple[float, float]:
-        """Return the variances of distance [m^2] and turn [rad^2] of one motion."""
+        """Return the variances of distance [m^2] and turn [rad^2] of one motion.
+
+        Odometry's own word on the distance counts where it is worse, up to the whole distance.
+        """
         length = abs(motion.distance_m)
         turn = abs(motion.turn_rad)
+        distance = self.distance**2 * length
+        told = motion.told_variance
+        if told > distance:
+            distance = max(distance, min(told, length * length))
         return (
-            self.distance**2 * length,
+            distance,
             self.heading_per_turn**2 * turn
             + self.heading_per_distance**2 * length
             + self.heading_per_time**2 * motion.dt_s,

@@ -85,5 +85,8 @@ def _part(whole: Motions, begin: int, end: int, length: int) -> Motions:
     """Return the motion from one instant to another of a step that lasts `length` [ns]."""
     share = (end - begin) / length
     return Motions(
-        whole.distance_m * share, whole.turn_rad * share, (end - begin) / NANOSECONDS
+        whole.distance_m * share,
+        whole.turn_rad * share,
+        (end - begin) / NANOSECONDS,
+        whole.told_variance * share,
     )

@@ -1,7 +1,8 @@
 """What an anchor at a known place reads: the distance to the tag, and its bias.
 
-h = |p + R(heading) l - a| + bias, in three dimensions, with p the base, l the tag's lever arm, a
-the anchor. Heights count: anchors hang well above the tag.
+h = |p(t - d) + R(heading(t - d)) l - a| + bias, in three dimensions, with p the base, l the tag's
+lever arm, a the anchor, and d the delay of the stamps, over which the robot moved on with the
+velocity that it had. Heights count: anchors hang well above the tag.
 """
 
 from __future__ import annotations
@@ -10,16 +11,20 @@ import math
 
 import numpy as np
 
-from tablerunner.estimation.models.state import HEADING, RANGE_BIAS, X, Y
+from tablerunner.estimation.models.state import HEADING, RANGE_BIAS, RANGE_DELAY, X, Y
 from tablerunner.types import Matrix, Vector
 
 Point3 = tuple[float, float, float]
+Twist = tuple[float, float]
+"""Forward speed [m/s] and turn rate [rad/s]."""
 
-_NEAREST_M = 1e-6  # closer, the direction to the anchor is noise
+STANDING: Twist = (0.0, 0.0)
+
+NEAREST_M = 1e-6  # closer, the direction to the anchor is noise
 
 
 def predict_range(
-    mean: Vector, anchor: Point3, lever_arm: Point3, bias_index: int
+    mean: Vector, anchor: Point3, lever_arm: Point3, bias_index: int, twist: Twist = STANDING
 ) -> tuple[float, Vector]:
     """Return the expected range and its Jacobian.
 
@@ -33,31 +38,52 @@ def predict_range(
         Tag in base_link [m].
     bias_index : int
         Which of the range biases belongs to this anchor.
+    twist : tuple
+        Forward speed [m/s] and turn rate [rad/s] of base_link.
 
     Returns
     -------
     expected : float
         Range [m].
     jacobian : ndarray, shape (n,)
-        d(range)/d(state); units 1, 1, m/rad, 0 ... 1. Zero towards an anchor that the tag touches.
+        d(range)/d(state); units 1, 1, m/rad, 0 ... m/s, 0 ... 1. Zero towards an anchor that the
+        tag touches.
     """
     # Plain floats: this runs for every range, and reading an array element costs ten times more.
-    x, y, heading = mean[:3].tolist()
+    x, y, heading, _, _, _, delay = mean[:RANGE_BIAS].tolist()
+    speed, turn_rate = twist
     cos, sin = math.cos(heading), math.sin(heading)
-    arm_x = cos * lever_arm[0] - sin * lever_arm[1]
-    arm_y = sin * lever_arm[0] + cos * lever_arm[1]
-    dx, dy = x + arm_x - anchor[0], y + arm_y - anchor[1]
-    distance = math.sqrt(dx * dx + dy * dy + (lever_arm[2] - anchor[2]) ** 2)
+    # The tag, seen from the base now: where it was a delay ago. Along and across the heading.
+    arm_x, arm_y, arm_z = lever_arm
+    if delay and turn_rate:
+        angle = -turn_rate * delay
+        turned, across = math.cos(angle), math.sin(angle)
+        arm_x, arm_y = turned * arm_x - across * arm_y, across * arm_x + turned * arm_y
+    ahead = arm_x - speed * delay
+    tag_x, tag_y = cos * ahead - sin * arm_y, sin * ahead + cos * arm_y
+    dx, dy, dz = x + tag_x - anchor[0], y + tag_y - anchor[1], arm_z - anchor[2]
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
     jacobian = np.zeros(len(mean))
-    if distance > _NEAREST_M:
+    if distance > NEAREST_M:
         ux, uy = dx / distance, dy / distance
-        jacobian[:3] = ux, uy, uy * arm_x - ux * arm_y
+        jacobian[X] = ux
+        jacobian[Y] = uy
+        jacobian[HEADING] = uy * tag_x - ux * tag_y
+        # The tag moves with the base and round it; a delay takes it back.
+        along, aside = speed - turn_rate * arm_y, turn_rate * arm_x
+        jacobian[RANGE_DELAY] = -(
+            ux * (cos * along - sin * aside) + uy * (sin * along + cos * aside)
+        )
     jacobian[RANGE_BIAS + bias_index] = 1.0
     return distance + float(mean[RANGE_BIAS + bias_index]), jacobian
 
 
 def predict_range_many(
-    means: Matrix, anchor: Point3, lever_arm: Point3, bias_index: int
+    means: Matrix,
+    anchor: Point3,
+    lever_arm: Point3,
+    bias_index: int,
+    twist: Twist = STANDING,
 ) -> Vector:
     """Return the expected range of many states at once [m], shape (k,).
 
@@ -65,11 +91,14 @@ def predict_range_many(
     ----------
     means : ndarray, shape (k, n)
         States as in `models.state`.
-    anchor, lever_arm, bias_index
+    anchor, lever_arm, bias_index, twist
         As for `predict_range`.
     """
-    cos, sin = np.cos(means[:, HEADING]), np.sin(means[:, HEADING])
-    dx = means[:, X] + cos * lever_arm[0] - sin * lever_arm[1] - anchor[0]
-    dy = means[:, Y] + sin * lever_arm[0] + cos * lever_arm[1] - anchor[1]
-    distance = np.sqrt(dx * dx + dy * dy + (lever_arm[2] - anchor[2]) ** 2)
+    delay, heading = means[:, RANGE_DELAY], means[:, HEADING]
+    back = heading - twist[1] * delay
+    cos, sin = np.cos(back), np.sin(back)
+    dx = means[:, X] - twist[0] * delay * np.cos(heading) + cos * lever_arm[0] - sin * lever_arm[1]
+    dy = means[:, Y] - twist[0] * delay * np.sin(heading) + sin * lever_arm[0] + cos * lever_arm[1]
+    dz = lever_arm[2] - anchor[2]
+    distance = np.sqrt((dx - anchor[0]) ** 2 + (dy - anchor[1]) ** 2 + dz**2)
     return np.asarray(distance + means[:, RANGE_BIAS + bias_index])

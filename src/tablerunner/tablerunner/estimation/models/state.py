@@ -1,14 +1,22 @@
 """Layout of the robot's state vector, shared by the filters that carry it.
 
-``[x, y, heading, scale, gyro_bias, range_bias of each anchor ...]``
+``[x, y, heading, scale, turn_scale, gyro_bias, range_delay, range_bias of each anchor ...]``
+
+==============  ===  ==========================================================================
+scale           1    by what share the wheels roll farther than they say
+turn_scale      1    the same for turns: error of the track, or of the gyroscope's scale
+gyro_bias       rad/s  what is left of the bias of the yaw rate
+range_delay     s    by how much the stamps of ranges are later than the ranging was
+range_bias      m    by how much an anchor reads too long
+==============  ===  ==========================================================================
 """
 
 from __future__ import annotations
 
-X, Y, HEADING, SCALE, GYRO_BIAS, RANGE_BIAS = range(6)
+X, Y, HEADING, SCALE, TURN_SCALE, GYRO_BIAS, RANGE_DELAY, RANGE_BIAS = range(8)
 """Indices; RANGE_BIAS is the first of as many as there are anchors."""
 
-BASE_NAMES = ('x', 'y', 'heading', 'scale', 'gyro_bias')
+BASE_NAMES = ('x', 'y', 'heading', 'scale', 'turn_scale', 'gyro_bias', 'range_delay')
 
 
 def state_names(anchor_ids: tuple[str, ...]) -> tuple[str, ...]:
