@@ -54,7 +54,7 @@ def correct_by_one(
     covariance: Matrix,
     innovation: Vector,
     slope: Matrix,
-    noise: float,
+    noise: float | Vector,
     used: Flags | None = None,
 ) -> CorrectedByOne:
     """Return the state corrected by one number, in Joseph's form (Sun 32), for any leading axes.
@@ -70,7 +70,7 @@ def correct_by_one(
     innovation : ndarray, shape (...)
     slope : ndarray, shape (..., n)
         d(measurement)/d(state).
-    noise : float
+    noise : float or ndarray, shape (...)
         Variance of the number.
     used : ndarray of bool, shape (...), optional
         States that are not corrected stay as they are; all are when not given.
@@ -82,7 +82,7 @@ def correct_by_one(
         gain = np.where(used[..., None], gain, 0.0)
         innovation = np.where(used, innovation, 0.0)
     left = covariance - gain[..., :, None] * cross[..., None, :]
-    pulled = np.einsum('...ij,...j->...i', left, slope) - gain * noise
+    pulled = np.einsum('...ij,...j->...i', left, slope) - gain * np.asarray(noise)[..., None]
     left -= pulled[..., :, None] * gain[..., None, :]
     moved = mean + gain * innovation[..., None]
     moved[..., 2] = wrap(moved[..., 2])

@@ -49,17 +49,17 @@ def predict_moving(
     mean : ndarray, shape (..., 5)
     covariance : ndarray, shape (..., 5, 5)
     motion : Motion or Motions
-        Odometry over the step; its time is not zero.
+        Odometry over the step. A step of no time changes nothing.
     turn_variance : float or ndarray, shape (...)
         Of the turn [rad^2].
     """
-    dt = motion.dt_s
+    dt = np.asarray(motion.dt_s)
     direction = mean[..., HEADING] + 0.5 * motion.turn_rad
     moved, spread = mean.copy(), covariance.copy()
-    moved[..., X : Y + 1] += dt * mean[..., VX:]
+    moved[..., X : Y + 1] += dt[..., None] * mean[..., VX:]
     moved[..., HEADING] = wrap(np.asarray(mean[..., HEADING] + motion.turn_rad))
-    spread[..., X : Y + 1, :] += dt * spread[..., VX:, :]
-    spread[..., :, X : Y + 1] += dt * spread[..., :, VX:]
+    spread[..., X : Y + 1, :] += dt[..., None, None] * spread[..., VX:, :]
+    spread[..., :, X : Y + 1] += dt[..., None, None] * spread[..., :, VX:]
     # White acceleration of density q: the exact integral over the step.
     density = config.acceleration_density
     for place, velocity in ((X, VX), (Y, VY)):
@@ -68,7 +68,9 @@ def predict_moving(
         spread[..., velocity, place] += density * dt**2 / 2.0
         spread[..., velocity, velocity] += density * dt
     spread[..., HEADING, HEADING] += turn_variance
-    speed = motion.distance_m / dt
+    lasts = dt > 0.0
+    time = np.where(lasts, dt, 1.0)
+    speed = motion.distance_m / time
     # Weighed by the time it stands for: ten readings a second tell as much as fifty. Noise of
     # both axes is independent, so that one can be taken after the other.
     for velocity, told in ((VX, speed * np.cos(direction)), (VY, speed * np.sin(direction))):
@@ -76,14 +78,12 @@ def predict_moving(
         slope[velocity] = 1.0
         innovation = np.asarray(told - moved[..., velocity])
         moved, spread, _ = correct_by_one(
-            moved, spread, innovation, slope, config.velocity_variance / dt
+            moved, spread, innovation, slope, config.velocity_variance / time, lasts
         )
     return moved, spread
 
 
-def expect_distance(
-    mean: Matrix, anchor: Point3, lever_arm: Point3
-) -> tuple[Vector, Matrix]:
+def expect_distance(mean: Matrix, anchor: Point3, lever_arm: Point3) -> tuple[Vector, Matrix]:
     """Return distances to an anchor (Sun 38), shape (...) [m], and their slopes, (..., 5)."""
     cos, sin = np.cos(mean[..., HEADING]), np.sin(mean[..., HEADING])
     dx = mean[..., X] + cos * lever_arm[0] - sin * lever_arm[1] - anchor[0]

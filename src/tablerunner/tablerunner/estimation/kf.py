@@ -116,9 +116,7 @@ class Kf:
             mean = estimate.mean.copy()
             mean[:2] += weighed.moved
             covariance = np.diag([*weighed.variance, estimate.covariance[2, 2]])
-            after = replace(
-                estimate, stamp=measurement.stamp, mean=mean, covariance=covariance
-            )
+            after = replace(estimate, stamp=measurement.stamp, mean=mean, covariance=covariance)
         return after, Innovation(
             measurement.stamp,
             measurement.source,

@@ -22,14 +22,14 @@ Stamps = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Motions:
-    """Arc lengths [m] and turns [rad] of many robots, shape (runs,), over the same dt [s].
+    """Arc lengths [m] and turns [rad] of many robots over dt [s], all of shape (runs,).
 
     `told_variance` is what odometry itself says of the arc lengths [m^2], as in `Motion`.
     """
 
     distance_m: Array
     turn_rad: Array
-    dt_s: float
+    dt_s: Array
     told_variance: Array
 
     @property
@@ -73,13 +73,22 @@ class BatchTrack:
     heading: Array
     told_variance: Array
 
-    def motions(self, index: int) -> Motions:
-        """Return the motions of the step that ends with a stamp."""
+    def motions(self, index: int, begin: Array, end: Array) -> Motions:
+        """Return the motions within the step that ends with a stamp.
+
+        Parameters
+        ----------
+        index : int
+            Of the stamp.
+        begin, end : ndarray, shape (runs,)
+            Of each run, as shares of the step from 0 to 1.
+        """
+        share = end - begin
         return Motions(
-            self.length[index] - self.length[index - 1],
-            self.heading[index] - self.heading[index - 1],
-            float(self.stamps[index] - self.stamps[index - 1]) / NANOSECONDS,
-            self.told_variance[index] - self.told_variance[index - 1],
+            share * (self.length[index] - self.length[index - 1]),
+            share * (self.heading[index] - self.heading[index - 1]),
+            share * (float(self.stamps[index] - self.stamps[index - 1]) / NANOSECONDS),
+            share * (self.told_variance[index] - self.told_variance[index - 1]),
         )
 
     def laid_on(self, start: tuple[float, float, float]) -> Array:
@@ -131,7 +140,7 @@ def _turns_by_gyro(
     """Return the turn of every step, shape (k - 1, runs), by the gyroscope where it speaks."""
     angle, alive = _angles(config, stamps, imu_stamps, yaw_rate)
     stands = (distance == 0.0) & (turn == 0.0)
-    turns = turn.copy()
+    turns: Array = turn.copy()
     runs = turn.shape[1]
     bias, learned, still = np.zeros(runs), np.zeros(runs), np.zeros(runs)
     for step in range(len(turn)):
@@ -169,4 +178,4 @@ def _angles(
     known = np.maximum(newest, 0)
     ahead = stamps - imu_stamps[known]
     held = summed[known] + yaw_rate[known] * (ahead / NANOSECONDS)[:, None]
-    return held, np.asarray((newest >= 0) & (ahead <= timeout))
+    return np.asarray(held), np.asarray((newest >= 0) & (ahead <= timeout))

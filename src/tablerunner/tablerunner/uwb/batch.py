@@ -179,9 +179,7 @@ def positions(
     std = np.hypot(
         variance_m2**0.5 if variance_m2 > 0.0 else UNKNOWN_STD_M, known * config.nlos_std
     )
-    fix = solve(
-        config.solver, places, epochs.ranges - bias, std, config.tag_height, epochs.nlos
-    )
+    fix = solve(config.solver, places, epochs.ranges - bias, std, config.tag_height, epochs.nlos)
     return fix.position, fix.solved
 
 

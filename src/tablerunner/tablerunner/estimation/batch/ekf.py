@@ -238,7 +238,7 @@ def _transport(covariance: Array, coupling: tuple[tuple[int, int, Array], ...]) 
     coupling : tuple of (row, column, ndarray of shape (runs,))
         Rows are of the pose.
     """
-    moved = covariance.copy()
+    moved: Array = covariance.copy()
     for row, column, value in coupling:
         moved[:, row] += value[:, None] * covariance[:, column]
     corner = moved[:, :_POSE, :_POSE].copy()
@@ -251,11 +251,14 @@ def _transport(covariance: Array, coupling: tuple[tuple[int, int, Array], ...]) 
 
 def _twist(estimate: BatchEstimate, moved: Array, motions: Motions) -> Array:
     """Return forward speed and turn rate of a step, (runs, 2), scale errors taken off."""
-    if motions.dt_s <= 0.0:
-        return estimate.twist
-    twist = np.empty_like(estimate.twist)
-    twist[:, 0] = (1.0 + moved[:, SCALE]) * motions.distance_m / motions.dt_s
-    turn = (1.0 + moved[:, TURN_SCALE]) * motions.turn_rad / motions.dt_s
-    twist[:, 1] = turn - moved[:, GYRO_BIAS]
-    twist[motions.stands] = 0.0
+    lasts = motions.dt_s > 0.0
+    time = np.where(lasts, motions.dt_s, 1.0)
+    turn_rate = (1.0 + moved[:, TURN_SCALE]) * motions.turn_rad / time - moved[:, GYRO_BIAS]
+    twist: Array = estimate.twist.copy()
+    for column, rate in (
+        (0, (1.0 + moved[:, SCALE]) * motions.distance_m / time),
+        (1, turn_rate),
+    ):
+        rate = np.where(motions.stands, 0.0, rate)
+        twist[:, column] = np.where(lasts, rate, estimate.twist[:, column])
     return twist

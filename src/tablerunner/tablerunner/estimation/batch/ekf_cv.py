@@ -35,8 +35,6 @@ class BatchEkfCv:
 
     def predict(self, estimate: BatchEstimate, motions: Motions) -> BatchEstimate:
         """Return the estimates carried on by their motions, the velocities measured."""
-        if motions.dt_s <= 0.0:
-            return estimate
         _, turned = variances(self.config.motion, motions)
         mean, covariance = predict_moving(
             self.config.sun, estimate.mean, estimate.covariance, motions, turned

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from tablerunner.estimation.batch.estimate import BatchEstimate, BatchInnovation
 from tablerunner.estimation.estimator import Start
 from tablerunner.odometry.batch import BatchTrack, Motions
-from tablerunner.types import NANOSECONDS
 from tablerunner.uwb.batch import BatchRanges
 
 Array = NDArray[np.float64]
@@ -56,37 +55,28 @@ def follow(
     start : Start
         At the first stamp of the odometry, the same for all runs.
     """
-    estimate = batch.start(start, track.heading.shape[1])
+    runs = track.heading.shape[1]
+    estimate = batch.start(start, runs)
     bounds = np.searchsorted(ranges.stamps, track.stamps, side='left')
     # A range of the very stamp of the start lies before all that is estimated.
     exchange = int(np.searchsorted(ranges.stamps, track.stamps[0], side='right'))
     for index in range(1, len(track.stamps)):
         before, after = int(track.stamps[index - 1]), int(track.stamps[index])
-        whole = track.motions(index)
-        reached = before
+        reached, whole = np.zeros(runs), np.ones(runs)
         for number in range(exchange, int(bounds[index])):
-            stamp = int(ranges.stamps[number])
-            if stamp > reached:
-                estimate = batch.predict(estimate, _part(whole, reached, stamp, after - before))
-                reached = stamp
+            range_m = ranges.range_m[number]
+            # Who has no range does not stop here: a step in two parts is not quite the same step.
+            share = (int(ranges.stamps[number]) - before) / (after - before)
+            stop = np.where(np.isfinite(range_m), share, reached)
+            estimate = batch.predict(estimate, track.motions(index, reached, stop))
+            reached = stop
             estimate, _ = batch.update_ranges(
                 estimate,
                 int(ranges.anchor[number]),
-                ranges.range_m[number],
+                range_m,
                 ranges.variance_m2,
                 ranges.nlos_probability[number],
             )
         exchange = max(exchange, int(bounds[index]))
-        estimate = batch.predict(estimate, _part(whole, reached, after, after - before))
+        estimate = batch.predict(estimate, track.motions(index, reached, whole))
         yield index, estimate
-
-
-def _part(whole: Motions, begin: int, end: int, length: int) -> Motions:
-    """Return the motion from one instant to another of a step that lasts `length` [ns]."""
-    share = (end - begin) / length
-    return Motions(
-        whole.distance_m * share,
-        whole.turn_rad * share,
-        (end - begin) / NANOSECONDS,
-        whole.told_variance * share,
-    )

@@ -29,11 +29,11 @@ Index = NDArray[np.int64]
 class _Instant(NamedTuple):
     """A time of each run: as a share of the step of odometry after a stamp; shapes (runs,)."""
 
-    index: Index
+    step: Index
     share: Array
 
     def some(self, runs: Index) -> _Instant:
-        return _Instant(self.index[runs], self.share[runs])
+        return _Instant(self.step[runs], self.share[runs])
 
 
 def follow_kf(
@@ -114,7 +114,7 @@ class _Follower:
         fresh = self._gatherer.begins(number, anchor)
         now = _Instant(np.full(len(self._runs), newest), np.full(len(self._runs), share))
         began = _Instant(
-            np.where(fresh, now.index, self._began.index),
+            np.where(fresh, now.step, self._began.step),
             np.where(fresh, now.share, self._began.share),
         )
         carried = self._distance(began, newest, anchor) - self._distance(now, newest, anchor)
@@ -125,17 +125,15 @@ class _Follower:
             self._correct(ended, whole.some(ended.runs))
         arrived = np.isfinite(measured)
         self._began = _Instant(
-            np.where(arrived, began.index, self._began.index),
+            np.where(arrived, began.step, self._began.step),
             np.where(arrived, began.share, self._began.share),
         )
 
     def _correct(self, ended: Finished, instant: _Instant) -> None:
         """Let the fixes of some runs correct their places."""
-        place, solved = positions(
-            self._positioner, self._anchors, ended, self._ranges.variance_m2
-        )
+        place, solved = positions(self._positioner, self._anchors, ended, self._ranges.variance_m2)
         runs = ended.runs[solved]
-        instant = _Instant(instant.index[solved], instant.share[solved])
+        instant = _Instant(instant.step[solved], instant.share[solved])
         last = self._last.some(runs)
         moved, way2 = self._moved(last, instant, runs)
         before = self._place[runs] + self._to_map(moved)
@@ -145,7 +143,7 @@ class _Follower:
         weighed = weigh(self._config.sun, grown, place[solved] - tag)
         self._place[runs] = before + weighed.moved
         self._variance[runs] = weighed.variance
-        self._last.index[runs] = instant.index
+        self._last.step[runs] = instant.step
         self._last.share[runs] = instant.share
 
     def _moved(self, begin: _Instant, end: _Instant, runs: Index) -> tuple[Array, Array]:
@@ -153,15 +151,15 @@ class _Follower:
 
         The squares are what the filter's noise grows with: one for each prediction.
         """
-        first, last = self._step[begin.index, runs], self._step[end.index, runs]
-        within = begin.index == end.index
+        first, last = self._step[begin.step, runs], self._step[end.step, runs]
+        within = begin.step == end.step
         part = np.where(within, end.share - begin.share, end.share)
         since = np.where(within, begin.share, 0.0)
-        turn = self._turn[end.index, runs]
-        course = self._track.heading[end.index, runs] + turn * (since + 0.5 * part)
+        turn = self._turn[end.step, runs]
+        course = self._track.heading[end.step, runs] + turn * (since + 0.5 * part)
         chord = _direction(course) * (part * last)[:, None]
-        whole = self._track.place[end.index, :, runs] - self._origin(begin, runs)
-        steps = self._squares[end.index, runs] - self._squares[begin.index + 1, runs]
+        whole = self._track.place[end.step, :, runs] - self._origin(begin, runs)
+        steps = self._squares[end.step, runs] - self._squares[begin.step + 1, runs]
         steps = steps + ((1.0 - begin.share) * first) ** 2
         way = np.where(within[:, None], 0.0, whole) + chord
         return way, np.where(within, 0.0, steps) + (part * last) ** 2
@@ -169,14 +167,14 @@ class _Follower:
     def _origin(self, instant: _Instant, runs: Index) -> Array:
         """Return from where straight to the end of its step each run went on, (m, 2), in odom."""
         left = 1.0 - instant.share
-        turn = self._turn[instant.index, runs]
-        course = self._track.heading[instant.index, runs] + turn * (instant.share + 0.5 * left)
-        chord = _direction(course) * (left * self._step[instant.index, runs])[:, None]
-        return np.asarray(self._track.place[instant.index + 1, :, runs] - chord)
+        turn = self._turn[instant.step, runs]
+        course = self._track.heading[instant.step, runs] + turn * (instant.share + 0.5 * left)
+        chord = _direction(course) * (left * self._step[instant.step, runs])[:, None]
+        return np.asarray(self._track.place[instant.step + 1, :, runs] - chord)
 
     def _heading(self, instant: _Instant, runs: Index) -> Array:
-        turn = self._turn[instant.index, runs]
-        return np.asarray(self._track.heading[instant.index, runs] + instant.share * turn)
+        turn = self._turn[instant.step, runs]
+        return np.asarray(self._track.heading[instant.step, runs] + instant.share * turn)
 
     def _distance(self, instant: _Instant, newest: int, anchor: int) -> Array:
         """Return how far the tag is believed to be from an anchor at instants, (runs,) [m].
@@ -184,17 +182,17 @@ class _Follower:
         By the odometry up to `newest`, beyond it by the velocity that it had.
         """
         runs, track = self._runs, self._track
-        ahead = instant.index == newest
-        step = np.where(ahead, newest - 1, instant.index)
+        ahead = instant.step == newest
+        step = np.where(ahead, newest - 1, instant.step)
         ratio = self._ratio(newest) if newest > 0 else 0.0
         share = np.where(ahead, instant.share * ratio, instant.share)
         step = np.maximum(step, 0)
         turn = share * self._turn[step, runs]
-        course = track.heading[instant.index, runs] + 0.5 * turn
+        course = track.heading[instant.step, runs] + 0.5 * turn
         way = _direction(course) * (share * self._step[step, runs])[:, None]
-        odom = track.place[instant.index, :, runs] + way
+        odom = track.place[instant.step, :, runs] + way
         base = self._place + self._to_map(odom - self._origin(self._last, runs))
-        heading = self._turned + track.heading[instant.index, runs] + turn
+        heading = self._turned + track.heading[instant.step, runs] + turn
         tag = base + _rotated(np.array(self._lever[:2]), heading)
         place = self._anchors[anchor].position
         return np.sqrt(
@@ -215,7 +213,9 @@ class _Follower:
 def _rotated(vector: Array, angle: Array | float) -> Array:
     """Return vectors, shape (2,) or (2, m), turned by an angle, shape (m, 2)."""
     cos, sin = np.cos(angle), np.sin(angle)
-    return np.stack([cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1]], axis=-1)
+    return np.stack(
+        [cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1]], axis=-1
+    )
 
 
 def _direction(angle: Array) -> Array:

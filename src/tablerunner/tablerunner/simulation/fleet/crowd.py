@@ -106,7 +106,9 @@ class FleetCrowd:
             for who, run in zip(*np.nonzero(arrived), strict=True):
                 self._arrive(int(who), int(run))
 
-    def _mind_robots(self, goes: NDArray[np.bool_], dt_s: float, robot: Array, radius: float) -> None:
+    def _mind_robots(
+        self, goes: NDArray[np.bool_], dt_s: float, robot: Array, radius: float
+    ) -> None:
         """Take out of `goes` who stops for the robot."""
         who, run = np.nonzero(goes & (self._look_s <= self._now_s))
         if not len(who):

@@ -112,7 +112,7 @@ class Fleet:
     def _read_encoders(self) -> Array:
         angle = self._encoder_start + self.base.angle_rad
         if self._tick_rad == 0.0:
-            return angle
+            return np.asarray(angle)
         return np.asarray(np.floor(angle / self._tick_rad) * self._tick_rad)
 
     def _read_gyro(self, stamp: int) -> Array:
@@ -122,7 +122,7 @@ class Fleet:
         self._gyro_bias = self._gyro_bias + errors.gyro_bias_walk * math.sqrt(dt_s) * draws[0]
         rate = self._gyro_scale * (self._turned / dt_s) + self._gyro_bias
         self._imu_ns, self._turned = stamp, np.zeros_like(self._turned)
-        return rate + errors.gyro_std * draws[1]
+        return np.asarray(rate + errors.gyro_std * draws[1])
 
     def _range(self, now: int, runs: NDArray[np.bool_]) -> None:
         base, places, sizes = self.base, self.crowd.places, self.crowd.sizes
@@ -130,7 +130,9 @@ class Fleet:
             away = np.hypot(places[0] - base.x, places[1] - base.y) - sizes[0]
             free = away.min(axis=0) - self._robot.footprint_radius
             self._closest_m = np.where(runs, np.minimum(self._closest_m, free), self._closest_m)
-        seen = self.radio.exchange(now, self.radio.tag(base.x, base.y, base.heading), places, sizes)
+        seen = self.radio.exchange(
+            now, self.radio.tag(base.x, base.y, base.heading), places, sizes
+        )
         gap = seen.rx_power_dbm - seen.first_path_power_dbm
         self._exchanges.append((now, seen.anchor, seen.flight_s, gap, seen.blocked))
 

@@ -53,7 +53,9 @@ class FleetRadio:
         self._mount = scenario.robot.tag_position
         self._sight = Sight(scenario.outlines)
         count, runs = len(scenario.anchors), len(seeds)
-        streams = [[stream(seed, f'uwb {anchor.id}') for seed in seeds] for anchor in scenario.anchors]
+        streams = [
+            [stream(seed, f'uwb {anchor.id}') for seed in seeds] for anchor in scenario.anchors
+        ]
         links = np.array([[random.standard_normal(2) for random in row] for row in streams])
         links = links.reshape(count, runs, 2)
         self.bias_m = links[:, :, 0] * self._errors.bias_std
