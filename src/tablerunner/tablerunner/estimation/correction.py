@@ -76,13 +76,57 @@ def correct_by_one(
         States that are not corrected stay as they are; all are when not given.
     """
     cross = np.einsum('...ij,...j->...i', covariance, slope)
-    spread = np.einsum('...i,...i->...', slope, cross) + noise
-    gain = cross / spread[..., None]
+    along = np.einsum('...i,...i->...', slope, cross)
+    return _by_one(mean, covariance, innovation, slope, _Row(cross, along, noise), used)
+
+
+def correct_state(
+    mean: Matrix,
+    covariance: Matrix,
+    innovation: Vector,
+    index: int,
+    noise: float | Vector,
+    used: Flags | None = None,
+) -> CorrectedByOne:
+    """Return the state corrected by a measurement of one of its numbers itself.
+
+    Parameters
+    ----------
+    index : int
+        Which number.
+    mean, covariance, innovation, noise, used
+        As for `correct_by_one`.
+    """
+    cross = covariance[..., :, index]
+    row = _Row(cross, cross[..., index], noise)
+    return _by_one(mean, covariance, innovation, index, row, used)
+
+
+class _Row(NamedTuple):
+    cross: Matrix  # (..., n), P H'
+    along: Vector  # (...), H P H'
+    noise: float | Vector
+
+
+def _by_one(
+    mean: Matrix,
+    covariance: Matrix,
+    innovation: Vector,
+    slope: Matrix | int,
+    row: _Row,
+    used: Flags | None,
+) -> CorrectedByOne:
+    spread = np.asarray(row.along + row.noise)
+    gain = row.cross / spread[..., None]
     if used is not None:
         gain = np.where(used[..., None], gain, 0.0)
         innovation = np.where(used, innovation, 0.0)
-    left = covariance - gain[..., :, None] * cross[..., None, :]
-    pulled = np.einsum('...ij,...j->...i', left, slope) - gain * np.asarray(noise)[..., None]
+    left = covariance - gain[..., :, None] * row.cross[..., None, :]
+    if isinstance(slope, int):
+        pulled = left[..., :, slope].copy()
+    else:
+        pulled = np.einsum('...ij,...j->...i', left, slope)
+    pulled -= gain * np.asarray(row.noise)[..., None]
     left -= pulled[..., :, None] * gain[..., None, :]
     moved = mean + gain * innovation[..., None]
     moved[..., 2] = wrap(moved[..., 2])

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tablerunner.estimation.correction import correct, correct_by_one, expect
+from tablerunner.estimation.correction import correct, correct_by_one, correct_state, expect
 from tablerunner.estimation.estimator import (
     RANGE_SOURCE,
     EstimatorConfig,
@@ -74,11 +74,9 @@ def predict_moving(
     # Weighed by the time it stands for: ten readings a second tell as much as fifty. Noise of
     # both axes is independent, so that one can be taken after the other.
     for velocity, told in ((VX, speed * np.cos(direction)), (VY, speed * np.sin(direction))):
-        slope = np.zeros(_SIZE)
-        slope[velocity] = 1.0
         innovation = np.asarray(told - moved[..., velocity])
-        moved, spread, _ = correct_by_one(
-            moved, spread, innovation, slope, config.velocity_variance / time, lasts
+        moved, spread, _ = correct_state(
+            moved, spread, innovation, velocity, config.velocity_variance / time, lasts
         )
     return moved, spread
 

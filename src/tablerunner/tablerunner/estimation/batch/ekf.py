@@ -42,6 +42,17 @@ class _Expected(NamedTuple):
     cross: Array  # (runs, n), covariance of state and range
 
 
+class _Step(NamedTuple):
+    """What the Jacobian of a motion is made of; arrays of shape (runs,)."""
+
+    dx: Array
+    dy: Array
+    by_scale_x: Array
+    by_scale_y: Array
+    told: Array
+    drift_s: Array
+
+
 class BatchEkf:
     """`Ekf` of many runs."""
 
@@ -80,25 +91,12 @@ class BatchEkf:
         moved[:, X] += dx
         moved[:, Y] += dy
         moved[:, HEADING] = wrap(mean[:, HEADING] + turn)
-        half_x, half_y = 0.5 * dx, 0.5 * dy
         covariance = _transport(
-            estimate.covariance,
-            (
-                (X, HEADING, -dy),
-                (Y, HEADING, dx),
-                (X, SCALE, step_x),
-                (Y, SCALE, step_y),
-                (X, TURN_SCALE, -half_y * told),
-                (Y, TURN_SCALE, half_x * told),
-                (HEADING, TURN_SCALE, told),
-                (X, GYRO_BIAS, half_y * drift_s),
-                (Y, GYRO_BIAS, -half_x * drift_s),
-                (HEADING, GYRO_BIAS, -drift_s),
-            ),
+            estimate.covariance, _Step(dx, dy, step_x, step_y, told, drift_s)
         )
         turned = 1.0 + mean[:, TURN_SCALE]
         by_distance = (length * cos, length * sin, np.zeros_like(cos))
-        by_turn = (-half_y * turned, half_x * turned, turned)
+        by_turn = (-0.5 * dy * turned, 0.5 * dx * turned, turned)
         self._add_noise(covariance, estimate, motions, (by_distance, by_turn))
         return BatchEstimate(moved, covariance, _twist(estimate, moved, motions), estimate.memory)
 
@@ -229,24 +227,26 @@ class BatchEkf:
         return _Expected(distance + mean[:, bias], variance, cross)
 
 
-def _transport(covariance: Array, coupling: tuple[tuple[int, int, Array], ...]) -> Array:
-    """Return F P F' of every run, F the identity and what of it the coupling says.
-
-    Parameters
-    ----------
-    covariance : ndarray, shape (runs, n, n)
-    coupling : tuple of (row, column, ndarray of shape (runs,))
-        Rows are of the pose.
-    """
+def _transport(covariance: Array, step: _Step) -> Array:
+    """Return F P F' of every run, F as in `models.motion_model.move`, shape (runs, n, n)."""
     moved: Array = covariance.copy()
-    for row, column, value in coupling:
-        moved[:, row] += value[:, None] * covariance[:, column]
-    corner = moved[:, :_POSE, :_POSE].copy()
-    for row, column, value in coupling:
-        corner[:, :, row] += value[:, None] * moved[:, :_POSE, column]
+    _turn_rows(moved, covariance, step)
+    turned = moved[:, :_POSE].swapaxes(1, 2)  # (runs, n, 3)
+    corner = turned[:, :_POSE].copy()
+    _turn_rows(corner, turned, step)
     moved[:, _POSE:, :_POSE] = moved[:, :_POSE, _POSE:].swapaxes(1, 2)
     moved[:, :_POSE, :_POSE] = 0.5 * (corner + corner.swapaxes(1, 2))
     return moved
+
+
+def _turn_rows(moved: Array, rows: Array, step: _Step) -> None:
+    """Add (F - I) times rows, (runs, n, m), to the rows of the pose, in place."""
+    turned = step.told[:, None] * rows[:, TURN_SCALE] - step.drift_s[:, None] * rows[:, GYRO_BIAS]
+    middle = rows[:, HEADING] + 0.5 * turned  # the way is laid along the mean heading
+    scaled = rows[:, SCALE]
+    moved[:, X] += step.by_scale_x[:, None] * scaled - step.dy[:, None] * middle
+    moved[:, Y] += step.by_scale_y[:, None] * scaled + step.dx[:, None] * middle
+    moved[:, HEADING] += turned
 
 
 def _twist(estimate: BatchEstimate, moved: Array, motions: Motions) -> Array:

@@ -55,7 +55,7 @@ class FleetCrowd:
         if len(counts) > 1:
             raise ConfigError('people', sorted(counts), 'the same number in every run')
         self._people = [list(column) for column in zip(*people, strict=True)]  # [person][run]
-        shape = (len(self._people), len(seeds))
+        self._shape = shape = (len(self._people), len(seeds))
         self._random = [
             [stream(seed, f'person {who.name}') for who, seed in zip(row, seeds, strict=True)]
             for row in self._people
@@ -84,7 +84,7 @@ class FleetCrowd:
 
     def _of(self, name: str) -> Array:
         values = [[getattr(person, name) for person in row] for row in self._people]
-        return np.array(values, dtype=float).reshape(len(self._people), -1)
+        return np.array(values, dtype=float).reshape(self._shape)
 
     @property
     def places(self) -> Array:
