@@ -20,7 +20,13 @@ import numpy as np
 
 from tablerunner.estimation.correction import correct, expect
 from tablerunner.estimation.ekf import Ekf
-from tablerunner.estimation.estimator import EstimatorConfig, Measurement, Start, no_use
+from tablerunner.estimation.estimator import (
+    EstimatorConfig,
+    Measurement,
+    RangeByRange,
+    Start,
+    no_use,
+)
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.estimation.models.state import BASE_NAMES, SCALE
@@ -36,7 +42,7 @@ class Dimension(Enum):
     BOTH = 2
 
 
-class Ddf:
+class Ddf(RangeByRange):
     """Dynamic dimension fusion of odometry and positions."""
 
     name = 'ddf'

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from tablerunner.estimation.ekf import Ekf
-from tablerunner.estimation.estimator import EstimatorConfig, Measurement, Start
+from tablerunner.estimation.estimator import EstimatorConfig, Measurement, RangeByRange, Start
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import Anchor, Estimate, Innovation, RangeSample
 
 
-class DeadReckoning:
+class DeadReckoning(RangeByRange):
     """Predicts as the EKF does, takes no measurement."""
 
     name = 'dead_reckoning'

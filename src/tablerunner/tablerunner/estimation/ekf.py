@@ -18,9 +18,12 @@ function and late data can be put in their place.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dtrtri
 
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.correction import correct, expect
@@ -174,6 +177,83 @@ class Ekf:
             return self._update_range(estimate, measurement)
         return self._update_pose(estimate, measurement)
 
+    def update_ranges(
+        self, estimate: Estimate, samples: Sequence[RangeSample]
+    ) -> tuple[Estimate, tuple[Innovation, ...]]:
+        """Return the estimate corrected by ranges of one instant, and what each of them did.
+
+        Where none is out of the ordinary they are one measurement of m numbers, linearised at
+        the estimate; the innovation of each is what those before it left open (the rows of the
+        whitened innovation). Else each is judged and taken by itself, one after the other.
+        """
+        together = self._update_together(estimate, samples) if len(samples) > 1 else None
+        if together is not None:
+            return together
+        innovations = []
+        for sample in samples:
+            estimate, innovation = self._update_range(estimate, sample)
+            innovations.append(innovation)
+        return estimate, tuple(innovations)
+
+    def _update_together(
+        self, estimate: Estimate, samples: Sequence[RangeSample]
+    ) -> tuple[Estimate, tuple[Innovation, ...]] | None:
+        """Return what `update_ranges` does if no range is out of the ordinary, else None."""
+        config, memory = self.config, list(estimate.memory)
+        slopes = np.empty((len(samples), self._size))
+        innovations = []
+        noises = []
+        for row, sample in enumerate(samples):
+            index, anchor = self._anchors[sample.anchor_id]
+            expected, slopes[row] = predict_range(
+                estimate.mean, anchor.position, self.lever_arm, index, estimate.twist
+            )
+            innovations.append(sample.range_m - anchor.bias_m - expected)
+            noises.append(range_variance(config, sample))
+        cross = estimate.covariance.dot(slopes.T)
+        spread = slopes.dot(cross)
+        spread.reshape(-1)[:: len(samples) + 1] += noises
+        # LAPACK itself: NumPy's wrappers take longer than the arithmetic.
+        root, fault = dpotrf(spread, lower=1)
+        if fault:
+            return None
+        whiten, _ = dtrtri(root, lower=1)
+        white = whiten.dot(innovations)
+        deviations = white.tolist()
+        if max(deviations) > config.huber or min(deviations) < -config.huber:
+            return None
+        scales = root.diagonal()
+        open_ = white * scales
+        variances = (scales * scales).reshape(-1, 1)
+        found = []
+        for row, (sample, deviation) in enumerate(zip(samples, deviations, strict=True)):
+            index = self._anchors[sample.anchor_id][0]
+            persistent = memory[index]
+            if persistent > config.persistence:
+                return None
+            memory[index] = persistent + config.persistence_share * (deviation - persistent)
+            found.append(
+                Innovation(
+                    sample.stamp,
+                    RANGE_SOURCE,
+                    sample.anchor_id,
+                    True,
+                    '',
+                    open_[row : row + 1],
+                    variances[row : row + 1],
+                    deviation * deviation,
+                    config.gate,
+                )
+            )
+        gained = cross.dot(whiten.T)
+        mean = estimate.mean + gained.dot(white)
+        if not -math.pi < mean[HEADING] <= math.pi:
+            mean[HEADING] = wrap(float(mean[HEADING]))
+        # A product with its own transpose is symmetric to the last bit.
+        covariance = estimate.covariance - gained.dot(gained.T)
+        after = Estimate(samples[0].stamp, mean, covariance, estimate.twist, tuple(memory))
+        return after, tuple(found)
+
     def _update_range(
         self, estimate: Estimate, sample: RangeSample
     ) -> tuple[Estimate, Innovation]:
@@ -183,40 +263,31 @@ class Ekf:
         innovation = sample.range_m - anchor.bias_m - expected
         noise = range_variance(config, sample)
         spread = variance + noise
-        nis = innovation * innovation / spread
         deviations = innovation / math.sqrt(spread)
-        memory = estimate.memory
-        before = memory[index]
+        memory = list(estimate.memory)
+        persistent = memory[index]
         clipped = min(max(deviations, -CLIP), CLIP)
-        persistent = before + config.persistence_share * (clipped - before)
-        memory = (*memory[:index], persistent, *memory[index + 1 :])
+        memory[index] = persistent = persistent + config.persistence_share * (clipped - persistent)
+        nis = deviations * deviations
         accepted, reason = nis <= config.gate, ''
         if accepted:
-            weighed = noise
-            if nis > config.huber**2:
+            weighed = spread
+            if abs(deviations) > config.huber:
                 # Huber: beyond the knee the pull stays constant, as if the noise were larger.
-                weighed = spread * abs(deviations) / config.huber - variance
+                weighed = spread * abs(deviations) / config.huber
                 reason = 'weight reduced'
             if deviations > 0.0 and persistent > config.persistence:
                 # Long for a while: so many readings share one error, and tell as little as one.
                 weighed += spread * persistent * persistent * config.persistence_count
                 reason = 'long for a while'
-            weighed_spread = variance + weighed
-            mean = estimate.mean + cross * (innovation / weighed_spread)
+            mean = estimate.mean + cross * (innovation / weighed)
             if not -math.pi < mean[HEADING] <= math.pi:
                 mean[HEADING] = wrap(float(mean[HEADING]))
-            after = Estimate(
-                sample.stamp,
-                mean,
-                self._corrected(estimate.covariance, cross, weighed_spread),
-                estimate.twist,
-                memory,
-            )
+            covariance = _without(estimate.covariance, cross, weighed)
+            after = Estimate(sample.stamp, mean, covariance, estimate.twist, tuple(memory))
         else:
             reason = 'beyond the gate'
-            after = Estimate(
-                estimate.stamp, estimate.mean, estimate.covariance, estimate.twist, memory
-            )
+            after = replace(estimate, memory=tuple(memory))
         return after, Innovation(
             sample.stamp,
             RANGE_SOURCE,
@@ -232,24 +303,13 @@ class Ekf:
     def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> Expected:
         """Return what an anchor should read, linearised at the mean.
 
-        A filter that spreads points instead overrides this.
+        A filter that spreads points instead overrides this and `_update_together`.
         """
         expected, jacobian = predict_range(
             estimate.mean, anchor.position, self.lever_arm, index, estimate.twist
         )
         cross = estimate.covariance.dot(jacobian)
         return Expected(expected, float(jacobian.dot(cross)), cross)
-
-    @staticmethod
-    def _corrected(covariance: Matrix, cross: Vector, spread: float) -> Matrix:
-        """Return the covariance after a range, P - c c'/s, symmetric to the last bit.
-
-        For the gain c/s of a single number, Joseph's form (Sun 32) is this very matrix; `spread`
-        is never smaller than the variance that it takes away by less than the least noise.
-        """
-        root = cross * (1.0 / math.sqrt(spread))
-        # As a product of matrices: half the time of an outer product by broadcasting.
-        return np.asarray(covariance - root.reshape(-1, 1).dot(root.reshape(1, -1)))
 
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.
@@ -276,6 +336,17 @@ class Ekf:
             seen.nis,
             self.config.pose_gate,
         )
+
+
+def _without(covariance: Matrix, cross: Vector, spread: float) -> Matrix:
+    """Return the covariance after a range, P - c c'/s, symmetric to the last bit.
+
+    For the gain c/s of a single number Joseph's form (Sun 32) is this very matrix, and no range
+    is weighed with less than `least_range_std`.
+    """
+    root = cross * (1.0 / math.sqrt(spread))
+    # As a product of matrices: half the time of an outer product by broadcasting.
+    return np.asarray(covariance - root.reshape(-1, 1).dot(root.reshape(1, -1)))
 
 
 def twist_of(estimate: Estimate, moved: Vector, motion: Motion) -> tuple[float, float]:

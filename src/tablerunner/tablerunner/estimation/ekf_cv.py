@@ -18,6 +18,7 @@ from tablerunner.estimation.estimator import (
     RANGE_SOURCE,
     EstimatorConfig,
     Measurement,
+    RangeByRange,
     Start,
     SunConfig,
 )
@@ -95,7 +96,7 @@ def expect_distance(mean: Matrix, anchor: Point3, lever_arm: Point3) -> tuple[Ve
     return distance, slope
 
 
-class EkfCv:
+class EkfCv(RangeByRange):
     """Extended Kalman filter with constant velocity on ranges and positions."""
 
     name = 'ekf_cv'

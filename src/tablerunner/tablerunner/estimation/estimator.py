@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -342,3 +343,23 @@ class Estimator(Protocol):
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a measurement of its stamp, and what happened."""
         ...
+
+    def update_ranges(
+        self, estimate: Estimate, samples: Sequence[RangeSample]
+    ) -> tuple[Estimate, tuple[Innovation, ...]]:
+        """Return the estimate corrected by ranges of one instant, and what each of them did."""
+        ...
+
+
+class RangeByRange:
+    """Takes ranges of one instant one after the other: for estimators without a better way."""
+
+    def update_ranges(
+        self: Estimator, estimate: Estimate, samples: Sequence[RangeSample]
+    ) -> tuple[Estimate, tuple[Innovation, ...]]:
+        """Return the estimate corrected by ranges of one instant, and what each of them did."""
+        innovations = []
+        for sample in samples:
+            estimate, innovation = self.update(estimate, sample)
+            innovations.append(innovation)
+        return estimate, tuple(innovations)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from tablerunner.estimation.estimator import (
     EstimatorConfig,
     Measurement,
+    RangeByRange,
     Start,
     SunConfig,
     no_use,
@@ -60,7 +61,7 @@ def weigh(config: SunConfig, variance: Vector, innovation: Vector) -> Weighed:
     return Weighed(gain * innovation, left, spread, accepted)
 
 
-class Kf:
+class Kf(RangeByRange):
     """Kalman filter on odometry and positions."""
 
     name = 'kf'

@@ -17,6 +17,10 @@ from tablerunner.types import Estimate, Innovation, OdometrySample, RangeSample
 _Key = tuple[int, int, str]  # stamp, rank, source key: a total order, whatever arrives first
 
 
+_RANGE = 1
+"""Rank of a range among entries of one stamp: after odometry, before poses."""
+
+
 @dataclass(slots=True)
 class _Entry:
     key: _Key
@@ -94,21 +98,51 @@ class Timeline:
         return index
 
     def _run(self, index: int) -> Innovation | None:
-        """Work out all entries from `index` on; return the innovation of the first."""
-        first = None
-        for position in range(max(index, 1), len(self._entries)):
-            entry, estimate = self._entries[position], self._entries[position - 1].after
-            stamp = entry.key[0]
+        """Work out all entries from `index` on; return the innovation of that one.
+
+        Ranges of one instant are one step: who comes first in it does not matter.
+        """
+        position, wanted = self._first_of_instant(max(index, 1)), None
+        while position < len(self._entries):
+            estimate = self._entries[position - 1].after
+            stamp = self._keys[position][0]
             if stamp > estimate.stamp:
                 motion = self._track.motion(estimate.stamp, stamp)
                 estimate = self.estimator.predict(estimate, motion, stamp)
-            innovation = None
-            if entry.measurement is not None:
-                estimate, innovation = self.estimator.update(estimate, entry.measurement)
-            entry.after = estimate
-            if position == index:
-                first = innovation
-        return first
+            samples = self._ranges_at(position)
+            innovations: tuple[Innovation, ...] = ()
+            if samples:
+                estimate, innovations = self.estimator.update_ranges(estimate, samples)
+            else:
+                measurement = self._entries[position].measurement
+                if measurement is not None:
+                    estimate, innovation = self.estimator.update(estimate, measurement)
+                    innovations = (innovation,)
+            for offset in range(max(len(innovations), 1)):
+                self._entries[position + offset].after = estimate
+            if position <= index < position + len(innovations):
+                wanted = innovations[index - position]
+            position += max(len(innovations), 1)
+        return wanted
+
+    def _first_of_instant(self, index: int) -> int:
+        """Return where the ranges begin that share the instant of a range."""
+        if index >= len(self._keys):
+            return index
+        stamp, rank, _ = self._keys[index]
+        while rank == _RANGE and self._keys[index - 1][:2] == (stamp, _RANGE):
+            index -= 1
+        return index
+
+    def _ranges_at(self, position: int) -> list[RangeSample]:
+        """Return the ranges of the instant that begins at an entry; none if it is no range."""
+        instant, samples = (self._keys[position][0], _RANGE), []
+        while position < len(self._keys) and self._keys[position][:2] == instant:
+            measurement = self._entries[position].measurement
+            if isinstance(measurement, RangeSample):
+                samples.append(measurement)
+            position += 1
+        return samples
 
     def _trim(self) -> None:
         horizon = self._keys[-1][0] - self._history
@@ -122,5 +156,5 @@ class Timeline:
 
 def _key(measurement: Measurement) -> _Key:
     if isinstance(measurement, RangeSample):
-        return (measurement.stamp, 1, f'{measurement.anchor_id}/{measurement.tag_id}')
+        return (measurement.stamp, _RANGE, f'{measurement.anchor_id}/{measurement.tag_id}')
     return (measurement.stamp, 2, measurement.source)

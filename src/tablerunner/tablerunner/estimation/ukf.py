@@ -7,6 +7,8 @@ linear measurements and corrected as there; so are gate, robust weight and start
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from filterpy.kalman import MerweScaledSigmaPoints
 
@@ -17,7 +19,7 @@ from tablerunner.estimation.models.range_model import Point3, predict_range_many
 from tablerunner.estimation.models.state import HEADING
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Matrix
+from tablerunner.types import Anchor, Estimate, Innovation, Matrix, RangeSample
 
 
 class Ukf(Ekf):
@@ -53,6 +55,13 @@ class Ukf(Ekf):
         weighted = self._points.Wc * (ranges - expected)
         cross = weighted @ (points - estimate.mean)
         return Expected(expected, float(weighted @ (ranges - expected)), cross)
+
+    def _update_together(
+        self,
+        estimate: Estimate,  # noqa: ARG002 - as the `ekf` has it
+        samples: Sequence[RangeSample],  # noqa: ARG002
+    ) -> tuple[Estimate, tuple[Innovation, ...]] | None:
+        return None  # always one after the other
 
     def _spread(self, estimate: Estimate) -> Matrix:
         """Return the sigma points, shape (2 n + 1, n); headings not wrapped."""

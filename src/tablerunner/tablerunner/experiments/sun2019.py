@@ -165,8 +165,8 @@ def run_sun2019(seeds: Sequence[int], progress: Progress) -> Outcome:
             'kf and ekf_cv run on the Q and R that the paper prints; the offset from which kf '
             'disbelieves a position (0.4 m) and the velocity noise of ekf_cv are ours, the same '
             'for both situations. ekf runs on its defaults.',
-            'People walk off the track, as in the paper: few of them along the walls, many also inside '
-            'the square.',
+            'People walk off the track, as in the paper: few of them along the walls, many also '
+            'inside the square.',
         ),
     )
 

@@ -91,9 +91,7 @@ class BatchEkf:
         moved[:, X] += dx
         moved[:, Y] += dy
         moved[:, HEADING] = wrap(mean[:, HEADING] + turn)
-        covariance = _transport(
-            estimate.covariance, _Step(dx, dy, step_x, step_y, told, drift_s)
-        )
+        covariance = _transport(estimate.covariance, _Step(dx, dy, step_x, step_y, told, drift_s))
         turned = 1.0 + mean[:, TURN_SCALE]
         by_distance = (length * cos, length * sin, np.zeros_like(cos))
         by_turn = (-0.5 * dy * turned, 0.5 * dx * turned, turned)
@@ -138,7 +136,7 @@ class BatchEkf:
         short = estimate.memory.min(axis=1) <= -self.config.persistence
         return np.asarray(short & (variance < self.config.doubt_limit**2))
 
-    def update_ranges(
+    def update_range(
         self,
         estimate: BatchEstimate,
         anchor: int,

@@ -41,7 +41,7 @@ class BatchEkfCv:
         )
         return BatchEstimate(mean, covariance, estimate.twist, estimate.memory)
 
-    def update_ranges(
+    def update_range(
         self,
         estimate: BatchEstimate,
         anchor: int,

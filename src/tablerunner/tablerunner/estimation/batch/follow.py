@@ -27,7 +27,7 @@ class BatchFilter(Protocol):
         """Return the estimates carried on by their motions."""
         ...
 
-    def update_ranges(
+    def update_range(
         self,
         estimate: BatchEstimate,
         anchor: int,
@@ -70,7 +70,7 @@ def follow(
             stop = np.where(np.isfinite(range_m), share, reached)
             estimate = batch.predict(estimate, track.motions(index, reached, stop))
             reached = stop
-            estimate, _ = batch.update_ranges(
+            estimate, _ = batch.update_range(
                 estimate,
                 int(ranges.anchor[number]),
                 range_m,
