@@ -118,8 +118,12 @@ class BatchEkf:
         for column, variance in zip(by_input, variances(config.motion, motions), strict=True):
             weighed = np.where(moves, variance, 0.0)
             for i in range(_POSE):
-                for j in range(_POSE):
-                    covariance[:, i, j] += weighed * column[i] * column[j]
+                along = weighed * column[i]
+                for j in range(i + 1):
+                    added = along * column[j]
+                    covariance[:, i, j] += added
+                    if i != j:
+                        covariance[:, j, i] += added
         doubts = moves & self._doubts(estimate)
         if doubts.any():
             place = np.where(doubts, config.doubt_std**2 * dt_s, 0.0)
@@ -183,8 +187,9 @@ class BatchEkf:
         share = np.where(accepted, 1.0 / (variance + weighed), 0.0)
         mean = estimate.mean + cross * (share * np.where(there, innovation, 0.0))[:, None]
         mean[:, HEADING] = wrap(mean[:, HEADING])
-        gained = (cross * share[:, None])[:, :, None] * cross[:, None, :]
-        after = BatchEstimate(mean, estimate.covariance - gained, estimate.twist, memory)
+        root = cross * np.sqrt(share)[:, None]
+        covariance = estimate.covariance - root[:, :, None] * root[:, None, :]
+        after = BatchEstimate(mean, covariance, estimate.twist, memory)
         return after, BatchInnovation(
             innovation, np.where(there, spread, np.nan), nis, np.asarray(accepted)
         )
