@@ -34,7 +34,7 @@ ANCHORS = tuple(
         [(0.0, 0.0, 2.2), (15.0, 0.0, 2.2), (15.0, 15.0, 2.2), (0.0, 15.0, 2.2)]
     )
 )
-CONFIG = EstimatorConfig(huber=100.0, gate=1e6, persistence=4.0)
+CONFIG = EstimatorConfig(huber=100.0, gate=1e6, persistence=4.0, doubt=4.0)
 MOTION = Motion(1e-4, 0.002, 0.02)  # nearly on the spot, where the ranges say it is
 START = Start(1, np.array([5.0, 6.0, 0.3]), np.eye(3) * 0.01)
 VARIANCE = 0.01

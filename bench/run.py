@@ -11,6 +11,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import filter_step
+import fuzzy
 import latency
 import memory
 import offline
@@ -27,6 +28,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'latency': latency.measure,
     'processor': processor.measure,
     'memory': memory.measure,
+    'fuzzy': fuzzy.measure,
 }
 WITH_BAR = {'solvers'}
 """Those that show a bar of their own, with which a spinner would fight for the line."""

@@ -127,6 +127,16 @@ class MagneticSample:
 
 
 @dataclass(frozen=True, slots=True)
+class HeadingSample:
+    """A heading of base_link in map from one source, as from a compass."""
+
+    stamp: int
+    heading_rad: float
+    variance: float  # [rad^2]
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
 class OdometrySample:
     """Pose and velocity in the odom frame, smooth and drifting."""
 

@@ -12,6 +12,7 @@ import typer
 from tablerunner.cli.calibrate import calibrate_app
 from tablerunner.cli.convert import convert_app
 from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
+from tablerunner.cli.explain_rule import explain_rule
 from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
@@ -37,6 +38,7 @@ def make_app() -> typer.Typer:
     app.command()(info)
     app.command()(plot)
     app.command()(reproduce)
+    app.command()(explain_rule)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')
     for entry in sorted(entry_points(group=GROUP), key=lambda item: item.name):

@@ -49,6 +49,22 @@ class AlignmentConfig(Config):
     max_position_std: float = parameter(
         0.3, unit='m', description='Position must be known better than this', above=0.0, high=5.0
     )
+    min_driven: float = parameter(
+        1.0,
+        unit='m',
+        description='Shortest way that a start is found from',
+        low=0.0,
+        high=100.0,
+    )
+    max_scatter: float = parameter(
+        4.0,
+        description=(
+            'Scatter of the ranges about the best pose, over the deviation that they are given, '
+            'beyond which odometry and ranges contradict each other (wheels that spin)'
+        ),
+        above=1.0,
+        high=100.0,
+    )
     ambiguity: float = parameter(
         6.0,
         description='By how much (log likelihood) any other pose must fit worse',
@@ -71,6 +87,8 @@ class Window:
     tags : ndarray, shape (m, 2)
         Tag antenna at each range, in the frame of base_link now.
     tag_height : float
+    driven : float
+        Length of the way over the window [m].
     turned_variance : float
         Variance of heading that odometry gathers over the window [rad^2].
     """
@@ -81,6 +99,7 @@ class Window:
     bias_index: np.ndarray[tuple[int, ...], np.dtype[np.int64]]
     tags: Matrix
     tag_height: float
+    driven: float
     turned_variance: float
 
 
@@ -134,6 +153,10 @@ def align(window: Window, bias_prior: Matrix, config: AlignmentConfig) -> Alignm
     rivals = cost[(turned > _SAME_HEADING) | (away > _SAME_PLACE_M)]
     lead = (float(rivals.min()) - float(cost[best])) / max(1.0, scale) if len(rivals) else np.inf
     words = _missing(covariance, lead, config)
+    if not words and window.driven < config.min_driven:
+        words = 'heading not certain yet: drive on'
+    if scale > config.max_scatter**2:
+        words = 'ranges and odometry contradict each other'
     if covariance[2, 2] > 0.5 * UNKNOWN_YAW_VARIANCE or lead < config.ambiguity:
         covariance = _without_heading(covariance, mean, cost, int(best), max(1.0, scale))
     return Alignment(mean[best], covariance, not words, words)

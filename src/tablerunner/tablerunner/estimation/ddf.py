@@ -31,7 +31,7 @@ from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.estimation.models.state import BASE_NAMES, SCALE
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Innovation, RangeSample
+from tablerunner.types import Anchor, Estimate, Innovation, PoseSample
 
 
 class Dimension(Enum):
@@ -78,7 +78,7 @@ class Ddf(RangeByRange):
 
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a position, and what happened."""
-        if isinstance(measurement, RangeSample):
+        if not isinstance(measurement, PoseSample):
             return no_use(estimate, measurement, 'ddf takes positions only')
         dimension = self.dimension(estimate)
         if dimension is Dimension.NONE:

@@ -26,6 +26,7 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dtrtri
 
 from tablerunner.errors import CovarianceError
+from tablerunner.estimation.correction import Expected as Linearised
 from tablerunner.estimation.correction import correct, expect
 from tablerunner.estimation.estimator import (
     RANGE_SOURCE,
@@ -52,12 +53,16 @@ from tablerunner.odometry.motion import Motion
 from tablerunner.types import (
     Anchor,
     Estimate,
+    HeadingSample,
     Innovation,
     Matrix,
     PoseSample,
     RangeSample,
     Vector,
 )
+
+LONG, SHORT = 'long for a while', 'short for a while'
+"""Why a range was taken as it was: its anchor's mean innovation is no chance."""
 
 CLIP = 4.0
 """One wild reading does not make an anchor's mean [standard deviations]."""
@@ -102,6 +107,7 @@ class Ekf:
         self._anchors = {anchor.anchor_id: (i, anchor) for i, anchor in enumerate(anchors)}
         self._size = RANGE_BIAS + len(anchors)
         self._calm = (0.0,) * len(anchors)
+        self._usual_bias = math.hypot(config.range_bias_common_std, config.range_bias_std)
         walk = np.zeros(self._size)
         walk[GYRO_BIAS] = config.gyro_bias_walk**2
         walk[RANGE_DELAY] = config.range_delay_walk**2
@@ -166,7 +172,7 @@ class Ekf:
 
     def _doubts(self, estimate: Estimate) -> bool:
         """Whether an anchor has read short for so long that the pose must be wrong."""
-        if not estimate.memory or min(estimate.memory) > -self.config.persistence:
+        if not estimate.memory or min(estimate.memory) > -self.config.doubt:
             return False
         variance = estimate.covariance
         return float(variance[X, X] + variance[Y, Y]) < self.config.doubt_limit**2
@@ -175,6 +181,8 @@ class Ekf:
         """Return the estimate corrected by a range or a pose, and what happened."""
         if isinstance(measurement, RangeSample):
             return self._update_range(estimate, measurement)
+        if isinstance(measurement, HeadingSample):
+            return self._update_heading(estimate, measurement)
         return self._update_pose(estimate, measurement)
 
     def update_ranges(
@@ -266,6 +274,10 @@ class Ekf:
         deviations = innovation / math.sqrt(spread)
         memory = list(estimate.memory)
         persistent = memory[index]
+        if persistent < -config.doubt and estimate.mean[RANGE_BIAS + index] > self._usual_bias:
+            # What has been learned of this anchor was something in the way, which is gone.
+            estimate = self._forget_bias(estimate, index)
+            return self._update_range(estimate, sample)
         clipped = min(max(deviations, -CLIP), CLIP)
         memory[index] = persistent = persistent + config.persistence_share * (clipped - persistent)
         nis = deviations * deviations
@@ -277,9 +289,11 @@ class Ekf:
                 weighed = spread * abs(deviations) / config.huber
                 reason = 'weight reduced'
             if deviations > 0.0 and persistent > config.persistence:
-                # Long for a while: so many readings share one error, and tell as little as one.
+                # So many readings share one error, and tell as little as one.
                 weighed += spread * persistent * persistent * config.persistence_count
-                reason = 'long for a while'
+                reason = LONG
+            elif persistent < -config.doubt:
+                reason = SHORT
             mean = estimate.mean + cross * (innovation / weighed)
             if not -math.pi < mean[HEADING] <= math.pi:
                 mean[HEADING] = wrap(float(mean[HEADING]))
@@ -300,6 +314,20 @@ class Ekf:
             config.gate,
         )
 
+    def _forget_bias(self, estimate: Estimate, index: int) -> Estimate:
+        """Return the estimate with one anchor's range bias back at its prior."""
+        row, mean, covariance = (
+            RANGE_BIAS + index,
+            estimate.mean.copy(),
+            estimate.covariance.copy(),
+        )
+        mean[row] = 0.0
+        covariance[row] = covariance[:, row] = 0.0
+        covariance[row, row] = self._usual_bias**2
+        memory = list(estimate.memory)
+        memory[index] = 0.0
+        return replace(estimate, mean=mean, covariance=covariance, memory=tuple(memory))
+
     def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> Expected:
         """Return what an anchor should read, linearised at the mean.
 
@@ -310,6 +338,16 @@ class Ekf:
         )
         cross = estimate.covariance.dot(jacobian)
         return Expected(expected, float(jacobian.dot(cross)), cross)
+
+    def _update_heading(
+        self, estimate: Estimate, sample: HeadingSample
+    ) -> tuple[Estimate, Innovation]:
+        innovation = np.array([wrap(sample.heading_rad - float(estimate.mean[HEADING]))])
+        slope = np.zeros((1, self._size))
+        slope[0, HEADING] = 1.0
+        seen = expect(estimate.covariance, innovation, slope, np.array([[sample.variance]]))
+        gate = self.config.heading_gate
+        return self._taken(estimate, seen, sample.stamp, sample.source, gate)
 
     def _update_pose(self, estimate: Estimate, sample: PoseSample) -> tuple[Estimate, Innovation]:
         # A position without heading leaves its third row out.
@@ -323,18 +361,18 @@ class Ekf:
             slope[2, HEADING] = 1.0
         noise = sample.covariance[:rows, :rows]
         seen = expect(estimate.covariance, innovation, slope, noise)
-        accepted = seen.nis <= self.config.pose_gate
-        after = correct(estimate, seen, sample.stamp) if accepted else estimate
+        gate = self.config.pose_gate
+        return self._taken(estimate, seen, sample.stamp, sample.source, gate)
+
+    @staticmethod
+    def _taken(
+        estimate: Estimate, seen: Linearised, stamp: int, source: str, gate: float
+    ) -> tuple[Estimate, Innovation]:
+        accepted = seen.nis <= gate
+        after = correct(estimate, seen, stamp) if accepted else estimate
+        reason = '' if accepted else 'beyond the gate'
         return after, Innovation(
-            sample.stamp,
-            sample.source,
-            '',
-            accepted,
-            '' if accepted else 'beyond the gate',
-            innovation,
-            seen.spread,
-            seen.nis,
-            self.config.pose_gate,
+            stamp, source, '', accepted, reason, seen.innovation, seen.spread, seen.nis, gate
         )
 
 

@@ -21,13 +21,22 @@ from tablerunner.estimation.estimator import (
     RangeByRange,
     Start,
     SunConfig,
+    no_use,
 )
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.batch import Motions
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Innovation, Matrix, RangeSample, Vector
+from tablerunner.types import (
+    Anchor,
+    Estimate,
+    HeadingSample,
+    Innovation,
+    Matrix,
+    RangeSample,
+    Vector,
+)
 
 X, Y, HEADING, VX, VY = range(5)
 _SIZE = 5
@@ -130,6 +139,8 @@ class EkfCv(RangeByRange):
 
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a range or a position (Sun 46, 47, 32)."""
+        if isinstance(measurement, HeadingSample):
+            return no_use(estimate, measurement, "the heading is odometry's")
         if isinstance(measurement, RangeSample):
             return self._update_range(estimate, measurement)
         place, slope = predict_position(estimate.mean, measurement.point)

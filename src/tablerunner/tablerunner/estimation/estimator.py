@@ -8,9 +8,17 @@ from typing import Protocol
 
 from tablerunner.config import Config, parameter
 from tablerunner.odometry.motion import Motion, MotionNoise
-from tablerunner.types import Estimate, Innovation, Matrix, PoseSample, RangeSample, Vector
+from tablerunner.types import (
+    Estimate,
+    HeadingSample,
+    Innovation,
+    Matrix,
+    PoseSample,
+    RangeSample,
+    Vector,
+)
 
-Measurement = RangeSample | PoseSample
+Measurement = RangeSample | PoseSample | HeadingSample
 """What an estimator can be corrected by."""
 
 
@@ -170,7 +178,7 @@ class EstimatorConfig(Config):
         dynamic=True,
     )
     range_delay_std: float = parameter(
-        0.01,
+        0.03,
         unit='s',
         description='Prior deviation of the delay of the stamps of ranges',
         low=0.0,
@@ -240,17 +248,17 @@ class EstimatorConfig(Config):
         dynamic=True,
     )
     persistence: float = parameter(
-        1.2,
+        0.6,
         description=(
             'Mean innovation of an anchor, in standard deviations, beyond which it has been long '
-            'or short for too long to be chance'
+            'for too long to be chance'
         ),
         above=0.0,
         high=4.0,
         dynamic=True,
     )
     persistence_share: float = parameter(
-        0.15,
+        0.1,
         description='Share of one range in that mean',
         above=0.0,
         high=1.0,
@@ -263,10 +271,20 @@ class EstimatorConfig(Config):
         high=1000.0,
         dynamic=True,
     )
+    doubt: float = parameter(
+        0.8,
+        description=(
+            'The same for an anchor that has been short: nothing in the way makes it so, and the '
+            'pose is doubted'
+        ),
+        above=0.0,
+        high=4.0,
+        dynamic=True,
+    )
     doubt_std: float = parameter(
         0.3,
         unit='m/sqrt(s)',
-        description='Noise of the place while anchors that are short for a while speak against it',
+        description='Noise of the place while it is doubted',
         low=0.0,
         high=10.0,
         dynamic=True,
@@ -290,6 +308,13 @@ class EstimatorConfig(Config):
     gate: float = parameter(
         16.0,
         description='Normalised innovation squared beyond which a range is refused',
+        above=0.0,
+        high=1e6,
+        dynamic=True,
+    )
+    heading_gate: float = parameter(
+        6.6,
+        description='The same for a heading, as of a compass',
         above=0.0,
         high=1e6,
         dynamic=True,

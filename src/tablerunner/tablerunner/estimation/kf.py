@@ -28,7 +28,7 @@ from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Innovation, RangeSample, Vector
+from tablerunner.types import Anchor, Estimate, Innovation, PoseSample, Vector
 
 STATE_NAMES = ('x', 'y', 'heading')
 
@@ -106,7 +106,7 @@ class Kf(RangeByRange):
         that a pose may have is left alone. A position far from where odometry has the robot is
         not believed: Sun's check that UWB operates properly (section 2.6).
         """
-        if isinstance(measurement, RangeSample):
+        if not isinstance(measurement, PoseSample):
             return no_use(estimate, measurement, 'kf takes positions only')
         expected, _ = predict_position(estimate.mean, measurement.point)
         innovation = np.array([measurement.pose.x, measurement.pose.y]) - expected

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.checks import check_pose, check_range
+from tablerunner.estimation.compass import Compass
 from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
+from tablerunner.estimation.evidence import Evidence
 from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.registry import ESTIMATORS
@@ -24,6 +25,7 @@ from tablerunner.types import (
     Anchor,
     Estimate,
     Innovation,
+    MagneticSample,
     OdometrySample,
     PoseSample,
     RangeSample,
@@ -35,7 +37,6 @@ from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 ODOMETRY_SOURCE = 'odom'
 INITIAL_POSE_SOURCE = 'initialpose'
-_FEWEST_FOR_LOST = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,7 @@ class Localizer:
         self._anchors: tuple[Anchor, ...] = ()
         self._anchor_ids: frozenset[str] = frozenset()
         self._fixes = FixMaker(config.positioner, (), self._lever_arm)
+        self._compass = Compass(config.compass)
         self._clear()
         self.set_anchors(anchors)
 
@@ -66,12 +68,12 @@ class Localizer:
         self._pending = _initial_pose(self.config)
         self._track = OdometryTrack()
         self._fixes.reset()
+        self._compass.reset()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
         self._lost = False
-        self._recent: deque[tuple[int, bool]] = deque()  # stamp, accepted
-        self._refused = 0  # of those
+        self._evidence = Evidence()
         self._accepted_stamp = 0
         self._forget_start()
 
@@ -91,6 +93,7 @@ class Localizer:
         """Use other dynamic settings from now on; the estimate goes on."""
         self.config = config
         self._fixes.configure(config.positioner)
+        self._compass.config = config.compass
         if self._timeline is not None:
             self._timeline.estimator = self._new_estimator()
 
@@ -237,6 +240,23 @@ class Localizer:
         self._watch(innovation)
         return Outcome(self.estimate, (innovation,))
 
+    def add_magnetic(self, sample: MagneticSample) -> Outcome:
+        """Take a magnetic field: a heading, where it is plausible and the start is known."""
+        heading = self._compass.add(sample)
+        if isinstance(heading, Refusal):
+            return Outcome(None, (), (heading,))
+        if heading is None:
+            return Outcome()
+        reason = self._place_fault(sample.stamp)
+        if not reason and self._timeline is None:
+            reason = 'start not known yet'
+        if reason or self._timeline is None:
+            return _refused(sample.stamp, heading.source, '', reason)
+        innovation = self._timeline.add(heading)
+        if innovation is None:
+            return _refused(sample.stamp, heading.source, '', 'repeated')
+        return Outcome(self.estimate, (innovation,))
+
     def set_pose(self, sample: PoseSample) -> Outcome:
         """Begin anew at a pose that a user gives; it overrides whatever was believed."""
         reason = check_pose(sample)
@@ -263,8 +283,7 @@ class Localizer:
             self._new_estimator(), self._track, start, nanoseconds(self.config.history)
         )
         self._lost = False
-        self._recent.clear()
-        self._refused = 0
+        self._evidence = Evidence()
         self._accepted_stamp = start.stamp
 
     def _place_fault(self, stamp: int) -> str:
@@ -310,18 +329,18 @@ class Localizer:
             self._begin(Start(stamp, estimate.mean[:3], estimate.pose_covariance))
 
     def _watch(self, innovation: Innovation) -> None:
-        """Count refusals at the gate; when most measurements contradict the pose, it is lost."""
+        """Gather what speaks against the pose; when it is too much, the robot is lost."""
         if self.config.estimator == 'dead_reckoning' or not innovation.considered:
             return
         if innovation.accepted:
             self._accepted_stamp = max(self._accepted_stamp, innovation.stamp)
-        recent = self._recent
-        recent.append((innovation.stamp, innovation.accepted))
-        self._refused += not innovation.accepted
-        while recent[-1][0] - recent[0][0] > nanoseconds(self.config.lost_window):
-            self._refused -= not recent.popleft()[1]
-        share = self._refused / len(recent)
-        if len(recent) >= _FEWEST_FOR_LOST and share > self.config.lost_share:
+        self._evidence.add(innovation, nanoseconds(self.config.lost_window))
+        evidence, config = self._evidence, self.config
+        if (
+            evidence.mean > config.lost_nis
+            or evidence.refused_for > nanoseconds(config.lost_silence)
+            or evidence.doubted_for > nanoseconds(config.lost_doubt)
+        ):
             self._timeline = None
             self._lost = True
             self._forget_start()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from tablerunner.config import Config, parameter
 from tablerunner.errors import ConfigError
 from tablerunner.estimation.alignment import AlignmentConfig
+from tablerunner.estimation.compass import CompassConfig
 from tablerunner.estimation.estimator import EstimatorConfig
 from tablerunner.estimation.registry import ESTIMATORS
 from tablerunner.uwb import PositionerConfig
@@ -62,24 +63,46 @@ class LocalizerConfig(Config):
         high=100.0,
     )
     lost_window: float = parameter(
-        3.0,
+        2.0,
         unit='s',
-        description='Time over which refused ranges are counted',
+        description='Time over which measurements that contradict the pose are counted',
         above=0.0,
         high=60.0,
         dynamic=True,
     )
-    lost_share: float = parameter(
-        0.7,
-        description='Share of refused ranges from which the robot counts as lost',
+    lost_nis: float = parameter(
+        4.0,
+        description=(
+            'Mean normalised innovation squared over that time from which the robot counts as '
+            'lost; a range that is too long counts for little, since something may be in the way'
+        ),
+        above=1.0,
+        high=1000.0,
+        dynamic=True,
+    )
+    lost_silence: float = parameter(
+        20.0,
+        unit='s',
+        description='Time without any accepted measurement after which the robot counts as lost',
         above=0.0,
-        high=1.0,
+        high=3600.0,
+        dynamic=True,
+    )
+    lost_doubt: float = parameter(
+        8.0,
+        unit='s',
+        description='Time over which ranges are short again and again until it counts as lost',
+        above=0.0,
+        high=3600.0,
         dynamic=True,
     )
     filter: EstimatorConfig = parameter(factory=EstimatorConfig, description='Noise and gates')
     positioner: PositionerConfig = parameter(
         factory=_patient_positioner,
         description='How ranges become positions, for kf and ddf; tag_position gives the height',
+    )
+    compass: CompassConfig = parameter(
+        factory=CompassConfig, description='The magnetic field as a source of heading'
     )
     alignment: AlignmentConfig = parameter(
         factory=AlignmentConfig, description='How the start is found'

@@ -99,6 +99,7 @@ class StartFinder:
             bias_index=np.array([index for index, _ in found]),
             tags=now.inverse().transform(in_odom),
             tag_height=self._lever_arm[2],
+            driven=track.driven(samples[0].stamp, self._reference),
             # On average a range is half the window old: odometry has turned half as far wrong.
             turned_variance=turned / 3.0 if math.isfinite(turned) else 0.0,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right, insort
+from itertools import pairwise
 
 from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
@@ -96,6 +97,12 @@ class OdometryTrack:
             seconds(end - start),
             max(spread_b - spread_a, 0.0),
         )
+
+    def driven(self, start: int, end: int) -> float:
+        """Return the length of the way between two instants [m], forward and backward alike."""
+        first, last = bisect_left(self._stamps, start), bisect_right(self._stamps, end)
+        lengths = self._lengths[first:last]
+        return sum(abs(after - before) for before, after in pairwise(lengths))
 
     def pose(self, stamp: int) -> Pose2:
         """Return the pose of base_link in odom at an instant."""

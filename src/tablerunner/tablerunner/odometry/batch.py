@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tablerunner.odometry.gyro import GyroConfig
 from tablerunner.odometry.motion import MotionNoise
 from tablerunner.odometry.odometer import OdometerConfig
+from tablerunner.odometry.slip import SlipConfig
 from tablerunner.types import NANOSECONDS, nanoseconds
 
 Array = NDArray[np.float64]
@@ -117,31 +118,40 @@ def dead_reckon(
     rolled = np.diff(wheels, axis=0) * config.wheels.wheel_radius
     distance = 0.5 * (rolled[:, 0] + rolled[:, 1])
     turn = (rolled[:, 1] - rolled[:, 0]) / config.wheels.track
+    missing = np.zeros_like(turn)
     if config.heading_source == 'gyro':
-        turn = _turns_by_gyro(config.gyro, stamps, distance, turn, imu_stamps, yaw_rate)
+        angles = _angles(config.gyro, stamps, imu_stamps, yaw_rate)
+        turn, missing = _turns_by_gyro(config, stamps, distance, turn, angles)
     heading = np.concatenate([np.zeros_like(turn[:1]), np.cumsum(turn, axis=0)])
     course = heading[:-1] + 0.5 * turn
     steps = np.stack([distance * np.cos(course), distance * np.sin(course)], axis=1)
     place = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
     length = np.concatenate([np.zeros_like(turn[:1]), np.cumsum(distance, axis=0)])
-    told = np.cumsum(config.noise.distance**2 * np.abs(distance), axis=0)
+    told = np.maximum(
+        config.noise.distance**2 * np.abs(distance), np.minimum(missing, distance**2)
+    )
+    told = np.cumsum(told, axis=0)
     told = np.concatenate([np.zeros_like(turn[:1]), told])
     return BatchTrack(stamps, place, length, heading, told)
 
 
 def _turns_by_gyro(
-    config: GyroConfig,
+    config: OdometerConfig,
     stamps: Stamps,
     distance: Array,
     turn: Array,
-    imu_stamps: Stamps,
-    yaw_rate: Array,
-) -> Array:
-    """Return the turn of every step, shape (k - 1, runs), by the gyroscope where it speaks."""
-    angle, alive = _angles(config, stamps, imu_stamps, yaw_rate)
+    angles: tuple[Array, NDArray[np.bool_]],
+) -> tuple[Array, Array]:
+    """Return the turn of every step by the gyroscope where it speaks, and what slips may cost.
+
+    Shapes (k - 1, runs): [rad], and the variance that a slip adds to the distance [m^2].
+    """
+    (angle, alive), gyro = angles, config.gyro
     stands = (distance == 0.0) & (turn == 0.0)
     turns: Array = turn.copy()
+    missing: Array = np.zeros_like(turn)
     runs = turn.shape[1]
+    slips = _Slips(config.slip, config.wheels.track, runs)
     bias, learned, still = np.zeros(runs), np.zeros(runs), np.zeros(runs)
     for step in range(len(turn)):
         if not (alive[step] and alive[step + 1]):
@@ -150,16 +160,38 @@ def _turns_by_gyro(
         dt_s = float(stamps[step + 1] - stamps[step]) / NANOSECONDS
         turned = angle[step + 1] - angle[step]
         drift = turned - bias * dt_s
-        rests = stands[step] & (np.abs(drift) <= config.still_rate * dt_s)
+        slipped = slips.add(turn[step], drift, distance[step], dt_s)
+        rests = stands[step] & (np.abs(drift) <= gyro.still_rate * dt_s)
         still = np.where(rests, still + dt_s, 0.0)
-        learns = rests & (still > config.still_time)
+        learns = rests & (still > gyro.still_time)
         turns[step] = np.where(learns, turn[step], drift)
+        missing[step] = np.where(learns, 0.0, slipped)
         if learns.any():
-            longer = np.minimum(learned + dt_s, config.bias_time_constant)
+            longer = np.minimum(learned + dt_s, gyro.bias_time_constant)
             learned = np.where(learns, longer, learned)
             share = np.minimum(1.0, dt_s / np.maximum(learned, 1e-12))
             bias = np.where(learns, bias + (turned / dt_s - bias) * share, bias)
-    return turns
+    return turns, missing
+
+
+class _Slips:
+    """`SlipWatch` of many robots."""
+
+    def __init__(self, config: SlipConfig, track_m: float, runs: int) -> None:
+        self._config, self._track_m = config, track_m
+        self._missing_m, self._since_s = np.zeros(runs), np.full(runs, np.inf)
+
+    def add(self, wheels_rad: Array, gyro_rad: Array, distance_m: Array, dt_s: float) -> Array:
+        """Return what a slip adds to the variance of each distance [m^2], shape (runs,)."""
+        config = self._config
+        apart = np.abs(wheels_rad - gyro_rad)
+        usual = config.rate * dt_s + config.per_turn * np.abs(gyro_rad)
+        slipping = apart > usual + config.per_speed * np.abs(distance_m)
+        new = slipping & (self._since_s > config.pause)
+        before = np.where(new, 0.0, self._missing_m)
+        self._since_s = np.where(slipping, 0.0, self._since_s + dt_s)
+        self._missing_m = before + np.where(slipping, 0.5 * self._track_m * apart, 0.0)
+        return np.where(slipping, self._missing_m**2 - before**2, 0.0)
 
 
 def _angles(

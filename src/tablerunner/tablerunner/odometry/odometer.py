@@ -9,8 +9,10 @@ import numpy as np
 
 from tablerunner.config import Config, parameter
 from tablerunner.geometry.pose import Pose2
+from tablerunner.odometry.clock_offset import ClockOffset
 from tablerunner.odometry.gyro import Gyro, GyroConfig
 from tablerunner.odometry.motion import Motion, MotionNoise, advance
+from tablerunner.odometry.slip import SlipConfig, SlipWatch
 from tablerunner.odometry.wheels import Wheels, WheelsConfig
 from tablerunner.types import ImuSample, Matrix, OdometrySample, Refusal, WheelSample
 
@@ -28,6 +30,7 @@ class OdometerConfig(Config):
     )
     wheels: WheelsConfig = parameter(factory=WheelsConfig, description='The drive wheels')
     gyro: GyroConfig = parameter(factory=GyroConfig, description='The gyroscope')
+    slip: SlipConfig = parameter(factory=SlipConfig, description='When wheels count as slipping')
     noise: MotionNoise = parameter(factory=MotionNoise, description='Growth of the covariance')
 
 
@@ -37,13 +40,16 @@ class Odometer:
     With ``heading_source: gyro`` each interval turns by the integral of the gyroscope less the
     bias that was learned while the wheels stood; the distance is laid along the mean heading (Sun
     11-14). While the IMU is silent the wheels give the turn, and each such interval is reported
-    as a refusal with the reason ``imu silent`` beside its odometry (`fell_back`).
+    as a refusal with the reason ``imu silent`` beside its odometry (`fell_back`). Where wheels and
+    gyroscope disagree on the turn, a wheel slips (`slipping`), and the distance is doubted.
     """
 
     def __init__(self, config: OdometerConfig) -> None:
         self.config = config
         self._wheels = Wheels(config.wheels)
         self._gyro = Gyro(config.gyro)
+        self._slip = SlipWatch(config.slip, config.wheels.track)
+        self._offset = ClockOffset()
         self.reset()
 
     def configure(self, config: OdometerConfig) -> None:
@@ -51,11 +57,14 @@ class Odometer:
         self.config = config
         self._wheels.config = config.wheels
         self._gyro.config = config.gyro
+        self._slip.config = config.slip
 
     def reset(self) -> None:
         """Start again at the origin of odom, as after a jump back in time."""
         self._wheels.reset()
         self._gyro.reset()
+        self._slip.reset()
+        self._offset.reset()
         self._pose = Pose2()
         self._covariance = np.zeros((3, 3))
         self._angle_used: float | None = None  # gyro integral at the last wheel sample
@@ -66,6 +75,21 @@ class Odometer:
     def gyro_bias(self) -> float:
         """Bias of the yaw rate that was learned at standstill [rad/s]."""
         return self._gyro.bias
+
+    @property
+    def slipping(self) -> bool:
+        """Whether wheels and gyroscope disagreed on the last turn."""
+        return self._slip.slipping
+
+    @property
+    def slips(self) -> int:
+        """Slips so far."""
+        return self._slip.count
+
+    @property
+    def imu_delay(self) -> tuple[float, float]:
+        """By how much the IMU's stamps are later than the wheels', and its deviation [s]."""
+        return self._offset.delay_s, self._offset.deviation_s
 
     def add_imu(self, sample: ImuSample) -> Refusal | None:
         """Take one IMU sample; return why it is refused, if it is."""
@@ -82,6 +106,7 @@ class Odometer:
         if motion is None:
             self._angle_used = self._gyro_angle(sample.stamp)
             return self._sample(sample.stamp, Motion(0.0, 0.0, 0.0))
+        self._slip.slipping = False
         if self.config.heading_source == 'gyro':
             motion = self._turn_by_gyro(motion, sample.stamp)
         self._covariance = _grow(self._covariance, self._pose, motion, self.config.noise)
@@ -100,6 +125,8 @@ class Odometer:
             return wheels
         turned = angle - before
         drift = turned - self._gyro.bias * wheels.dt_s
+        self._offset.add(wheels.turn_rad, drift, wheels.dt_s)
+        missing = self._slip.add(wheels.turn_rad, drift, wheels.distance_m, wheels.dt_s)
         stands = wheels.distance_m == 0.0 and wheels.turn_rad == 0.0  # not one encoder tick
         if not stands or abs(drift) > self.config.gyro.still_rate * wheels.dt_s:
             self._still = 0.0
@@ -109,7 +136,7 @@ class Odometer:
                 self._gyro.learn_bias(turned / wheels.dt_s, wheels.dt_s)
                 # Wheels that stand do not turn the robot: hold the heading.
                 return wheels
-        return Motion(wheels.distance_m, drift, wheels.dt_s)
+        return Motion(wheels.distance_m, drift, wheels.dt_s, missing)
 
     def _sample(self, stamp: int, motion: Motion) -> OdometrySample:
         dt = motion.dt_s

@@ -15,7 +15,7 @@ from tablerunner.types import Anchor, RangeSample
 
 RUNS = 60
 STEPS = 600
-CONFIG = EstimatorConfig(motion=MotionNoise(), huber=100.0, gate=1e6, persistence=4.0)
+CONFIG = EstimatorConfig(motion=MotionNoise(), huber=100.0, gate=1e6, persistence=4.0, doubt=4.0)
 PRIOR = np.array([0.2, 0.2, 0.1])
 
 

@@ -25,7 +25,7 @@ from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import PoseSample, RangeSample
 
-OPEN = EstimatorConfig(huber=100.0, gate=1e6, pose_gate=1e6, persistence=4.0)
+OPEN = EstimatorConfig(huber=100.0, gate=1e6, pose_gate=1e6, persistence=4.0, doubt=4.0)
 POSE = np.array([4.0, 3.0, 0.8])
 
 

@@ -22,7 +22,7 @@ from tablerunner.estimation.ukf import Ukf
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import RangeSample
 
-OPEN = EstimatorConfig(huber=100.0, gate=1e6, pose_gate=1e6, persistence=4.0)
+OPEN = EstimatorConfig(huber=100.0, gate=1e6, pose_gate=1e6, persistence=4.0, doubt=4.0)
 POSE = np.array([4.0, 3.0, 0.8])
 
 

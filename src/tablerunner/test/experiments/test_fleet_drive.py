@@ -26,7 +26,7 @@ from tablerunner.experiments.fleet_drive import (
     ranged,
     reckoned,
 )
-from tablerunner.odometry import OdometerConfig
+from tablerunner.odometry import Odometer, OdometerConfig
 from tablerunner.scenario import (
     AnchorPlace,
     Person,
@@ -35,6 +35,7 @@ from tablerunner.scenario import (
     SensorErrors,
     UwbErrors,
     Wall,
+    WheelErrors,
 )
 from tablerunner.simulation.fleet import FleetRecord
 from tablerunner.simulation.truth import RangeTruth
@@ -51,6 +52,7 @@ PEOPLE = (
 )
 LEVER = (-0.05, 0.0, 1.1)
 UWB = UwbErrors(rate=9.0, bias_std=0.03, loss_probability=0.1, person_excess=(0.1, 0.7))
+WHEELS = WheelErrors(slip_rate=0.2, slip_duration=0.5, slip_share=1.0)
 SCENARIO = Scenario(
     name='small',
     walls=(Wall(HULL, 'hull', closed=True),),
@@ -58,7 +60,7 @@ SCENARIO = Scenario(
     people=PEOPLE,
     start=START,
     robot=RobotGeometry(tag_position=LEVER, ultrasonics=()),
-    sensors=SensorErrors(uwb=UWB),
+    sensors=SensorErrors(uwb=UWB, wheels=WHEELS),
 )
 RANGER = RangerConfig(
     anchor_ids=tuple(anchor.id for anchor in SCENARIO.anchors),
@@ -146,6 +148,25 @@ def test_odometry_equals_the_nodes_on_the_same_samples(drives, record, source):
     for run, drive in enumerate(drives):
         _, expected = dead_reckoned(drive, config)
         assert places[:, :, run] == pytest.approx(expected[: len(places)], abs=1e-9)
+
+
+def test_slips_are_noticed_as_by_the_nodes(drives, record):
+    """What odometry says of its own distances, step by step."""
+    track = reckoned(record, ODOMETER)
+    slips = 0
+    for run, drive in enumerate(drives):
+        odometer, told = Odometer(ODOMETER), []
+        for sample in drive.samples:
+            if isinstance(sample, ImuSample):
+                odometer.add_imu(sample)
+            elif isinstance(sample, WheelSample):
+                moved = odometer.add_wheels(sample)
+                told.append(moved.twist_covariance[0, 0])
+        slips += odometer.slips
+        steps = np.diff(record.stamps) * 1e-9
+        found = np.diff(track.told_variance[:, run]) / steps**2
+        assert found == pytest.approx(told[1 : len(record.stamps)], abs=1e-9)
+    assert slips > 2
 
 
 def test_odometry_falls_back_on_the_wheels_while_the_gyro_is_silent(drives, record):

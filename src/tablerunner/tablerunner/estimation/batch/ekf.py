@@ -7,6 +7,7 @@ for one robot and impossible for many; a property test holds both together to 1e
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -65,6 +66,7 @@ class BatchEkf:
         self._anchors = anchors
         self._lever_arm = lever_arm
         self._single = Ekf(config, anchors, lever_arm)
+        self._usual_bias = math.hypot(config.range_bias_common_std, config.range_bias_std)
         walk = np.zeros(RANGE_BIAS + len(anchors))
         walk[GYRO_BIAS] = config.gyro_bias_walk**2
         walk[RANGE_DELAY] = config.range_delay_walk**2
@@ -137,7 +139,7 @@ class BatchEkf:
         if not estimate.memory.shape[1]:
             return np.zeros(len(estimate.mean), dtype=bool)
         variance = estimate.covariance[:, X, X] + estimate.covariance[:, Y, Y]
-        short = estimate.memory.min(axis=1) <= -self.config.persistence
+        short = estimate.memory.min(axis=1) <= -self.config.doubt
         return np.asarray(short & (variance < self.config.doubt_limit**2))
 
     def update_range(
@@ -164,6 +166,7 @@ class BatchEkf:
         """
         config = self.config
         there = np.isfinite(range_m)
+        estimate = self._forget_biases(estimate, anchor, there)
         expected, variance, cross = self._expect(estimate, anchor)
         innovation = range_m - self._anchors[anchor].bias_m - expected
         least = variance_m2 if variance_m2 > 0.0 else config.default_range_std**2
@@ -193,6 +196,22 @@ class BatchEkf:
         return after, BatchInnovation(
             innovation, np.where(there, spread, np.nan), nis, np.asarray(accepted)
         )
+
+    def _forget_biases(self, estimate: BatchEstimate, anchor: int, there: Flags) -> BatchEstimate:
+        """Return the estimates, a bias at its prior where it was something in the way."""
+        row, usual = RANGE_BIAS + anchor, self._usual_bias
+        gone = there & (estimate.memory[:, anchor] < -self.config.doubt)
+        gone &= estimate.mean[:, row] > usual
+        if not gone.any():
+            return estimate
+        mean, covariance = estimate.mean.copy(), estimate.covariance.copy()
+        memory = estimate.memory.copy()
+        mean[gone, row] = 0.0
+        covariance[gone, row] = 0.0
+        covariance[gone, :, row] = 0.0
+        covariance[gone, row, row] = usual**2
+        memory[gone, anchor] = 0.0
+        return BatchEstimate(mean, covariance, estimate.twist, memory)
 
     def _expect(self, estimate: BatchEstimate, index: int) -> _Expected:
         """Return what an anchor should read, linearised at the means; see `predict_range`."""

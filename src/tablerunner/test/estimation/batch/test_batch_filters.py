@@ -80,6 +80,9 @@ def config_of(rng: np.random.Generator) -> EstimatorConfig:
         huber=rng.uniform(0.5, 3.0),
         gate=rng.uniform(2.0, 30.0),
         persistence=rng.uniform(0.3, 1.5),
+        doubt=rng.uniform(0.3, 1.5),
+        range_bias_std=0.05,
+        range_bias_common_std=0.02,
         doubt_limit=rng.uniform(0.1, 1.0),
     )
 
