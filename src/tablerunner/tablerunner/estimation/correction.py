@@ -123,7 +123,7 @@ def _by_one(
         innovation = np.where(used, innovation, 0.0)
     left = covariance - gain[..., :, None] * row.cross[..., None, :]
     if isinstance(slope, int):
-        pulled = left[..., :, slope].copy()
+        pulled = left[..., :, slope].copy(order='K')
     else:
         pulled = np.einsum('...ij,...j->...i', left, slope)
     pulled -= gain * np.asarray(row.noise)[..., None]

@@ -65,7 +65,7 @@ def predict_moving(
     """
     dt = np.asarray(motion.dt_s)
     direction = mean[..., HEADING] + 0.5 * motion.turn_rad
-    moved, spread = mean.copy(), covariance.copy()
+    moved, spread = mean.copy(order='K'), covariance.copy(order='K')
     moved[..., X : Y + 1] += dt[..., None] * mean[..., VX:]
     moved[..., HEADING] = wrap(np.asarray(mean[..., HEADING] + motion.turn_rad))
     spread[..., X : Y + 1, :] += dt[..., None, None] * spread[..., VX:, :]

@@ -89,15 +89,14 @@ class BatchEkf:
         length = 1.0 + mean[:, SCALE]
         step_x, step_y = distance * cos, distance * sin
         dx, dy = length * step_x, length * step_y
-        moved = mean.copy()
+        moved = mean.copy(order='K')
         moved[:, X] += dx
         moved[:, Y] += dy
-        moved[:, HEADING] = wrap(mean[:, HEADING] + turn)
+        moved[:, HEADING] = _wrapped(mean[:, HEADING] + turn)
         covariance = _transport(estimate.covariance, _Step(dx, dy, step_x, step_y, told, drift_s))
         turned = 1.0 + mean[:, TURN_SCALE]
-        by_distance = (length * cos, length * sin, np.zeros_like(cos))
-        by_turn = (-0.5 * dy * turned, 0.5 * dx * turned, turned)
-        self._add_noise(covariance, estimate, motions, (by_distance, by_turn))
+        by_input = (length * cos, length * sin, -0.5 * dy * turned, 0.5 * dx * turned, turned)
+        self._add_noise(covariance, estimate, motions, by_input)
         return BatchEstimate(moved, covariance, _twist(estimate, moved, motions), estimate.memory)
 
     def _add_noise(
@@ -105,27 +104,28 @@ class BatchEkf:
         covariance: Array,
         estimate: BatchEstimate,
         motions: Motions,
-        by_input: tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]],
+        by_input: tuple[Array, Array, Array, Array, Array],
     ) -> None:
-        """Add the process noise of a step to covariances, (runs, n, n), in place."""
+        """Add the process noise of a step to covariances, (runs, n, n), in place.
+
+        `by_input` is as of `models.motion_model.Moved`.
+        """
         config, dt_s = self.config, motions.dt_s
         moves = ~motions.stands
-        for index, walk in enumerate(self._walk):
-            if walk > 0.0:
-                covariance[:, index, index] += walk * dt_s
+        np.einsum('rii->ri', covariance)[...] += dt_s[:, None] * self._walk
         covariance[:, SCALE, SCALE] += config.scale_walk**2 * np.abs(motions.distance_m)
         covariance[:, TURN_SCALE, TURN_SCALE] += config.turn_scale_walk**2 * np.abs(
             motions.turn_rad
         )
-        for column, variance in zip(by_input, variances(config.motion, motions), strict=True):
-            weighed = np.where(moves, variance, 0.0)
-            for i in range(_POSE):
-                along = weighed * column[i]
-                for j in range(i + 1):
-                    added = along * column[j]
-                    covariance[:, i, j] += added
-                    if i != j:
-                        covariance[:, j, i] += added
+        distance, turn = (moves * value for value in variances(config.motion, motions))
+        gx, gy, ex, ey, turned = by_input
+        covariance[:, X, X] += gx * gx * distance + ex * ex * turn
+        covariance[:, Y, Y] += gy * gy * distance + ey * ey * turn
+        _add_both(covariance, X, Y, gx * gy * distance + ex * ey * turn)
+        turn = turn * turned
+        _add_both(covariance, X, HEADING, ex * turn)
+        _add_both(covariance, Y, HEADING, ey * turn)
+        covariance[:, HEADING, HEADING] += turned * turn
         doubts = moves & self._doubts(estimate)
         if doubts.any():
             place = np.where(doubts, config.doubt_std**2 * dt_s, 0.0)
@@ -170,28 +170,29 @@ class BatchEkf:
         expected, variance, cross = self._expect(estimate, anchor)
         innovation = range_m - self._anchors[anchor].bias_m - expected
         least = variance_m2 if variance_m2 > 0.0 else config.default_range_std**2
-        likely = np.where(nlos_probability > 0.0, nlos_probability, 0.0)  # NaN says nothing
+        likely = np.fmax(nlos_probability, 0.0)  # NaN says nothing
         noise = max(least, config.least_range_std**2) + (likely * config.nlos_std) ** 2
         spread = variance + noise
-        nis = innovation * innovation / spread
-        deviations = np.where(there, innovation / np.sqrt(spread), 0.0)
+        known = innovation if there.all() else np.where(there, innovation, 0.0)
+        deviations = known / np.sqrt(spread)
+        size = np.abs(deviations)
         before = estimate.memory[:, anchor]
-        persistent = before + config.persistence_share * (
-            np.clip(deviations, -CLIP, CLIP) - before
-        )
-        memory = estimate.memory.copy()
+        clipped = np.minimum(np.maximum(deviations, -CLIP), CLIP)
+        persistent = before + config.persistence_share * (clipped - before)
+        memory = estimate.memory.copy(order='K')
         memory[:, anchor] = np.where(there, persistent, before)
-        accepted = there & (nis <= config.gate)
-        weighed = np.where(
-            nis > config.huber**2, spread * np.abs(deviations) / config.huber - variance, noise
-        )
+        nis = innovation * innovation / spread
+        accepted = there & (deviations * deviations <= config.gate)
+        weight = np.maximum(size / config.huber, 1.0)
         long = (deviations > 0.0) & (persistent > config.persistence)
-        weighed += np.where(long, spread * persistent**2 * config.persistence_count, 0.0)
-        share = np.where(accepted, 1.0 / (variance + weighed), 0.0)
-        mean = estimate.mean + cross * (share * np.where(there, innovation, 0.0))[:, None]
-        mean[:, HEADING] = wrap(mean[:, HEADING])
+        if long.any():
+            weight += np.where(long, persistent**2 * config.persistence_count, 0.0)
+        share = accepted / (spread * weight)
+        mean = estimate.mean + cross * (share * known)[:, None]
+        mean[:, HEADING] = _wrapped(mean[:, HEADING])
         root = cross * np.sqrt(share)[:, None]
-        covariance = estimate.covariance - root[:, :, None] * root[:, None, :]
+        covariance = root[:, :, None] * root[:, None, :]
+        np.subtract(estimate.covariance, covariance, out=covariance)
         after = BatchEstimate(mean, covariance, estimate.twist, memory)
         return after, BatchInnovation(
             innovation, np.where(there, spread, np.nan), nis, np.asarray(accepted)
@@ -204,8 +205,8 @@ class BatchEkf:
         gone &= estimate.mean[:, row] > usual
         if not gone.any():
             return estimate
-        mean, covariance = estimate.mean.copy(), estimate.covariance.copy()
-        memory = estimate.memory.copy()
+        mean, covariance = estimate.mean.copy(order='K'), estimate.covariance.copy()
+        memory = estimate.memory.copy(order='K')
         mean[gone, row] = 0.0
         covariance[gone, row] = 0.0
         covariance[gone, :, row] = 0.0
@@ -240,21 +241,31 @@ class BatchEkf:
             ),
         )
         bias = RANGE_BIAS + index
-        cross = estimate.covariance[:, :, bias].copy()
+        cross = estimate.covariance[:, :, bias].copy(order='K')
         for column, slope in slopes:
             cross += estimate.covariance[:, :, column] * slope[:, None]
-        variance = cross[:, bias].copy()
+        variance = cross[:, bias].copy(order='K')
         for column, slope in slopes:
             variance += slope * cross[:, column]
         return _Expected(distance + mean[:, bias], variance, cross)
 
 
+def _wrapped(heading: Array) -> Array:
+    """Return `wrap(heading)`; the common case, nothing to do, costs a fraction of it."""
+    return heading if (np.abs(heading) < np.pi).all() else wrap(heading)
+
+
+def _add_both(covariance: Array, row: int, column: int, value: Array) -> None:
+    covariance[:, row, column] += value
+    covariance[:, column, row] += value
+
+
 def _transport(covariance: Array, step: _Step) -> Array:
     """Return F P F' of every run, F as in `models.motion_model.move`, shape (runs, n, n)."""
-    moved: Array = covariance.copy()
+    moved: Array = covariance.copy(order='K')
     _turn_rows(moved, covariance, step)
     turned = moved[:, :_POSE].swapaxes(1, 2)  # (runs, n, 3)
-    corner = turned[:, :_POSE].copy()
+    corner = turned[:, :_POSE].copy(order='K')
     _turn_rows(corner, turned, step)
     moved[:, _POSE:, :_POSE] = moved[:, :_POSE, _POSE:].swapaxes(1, 2)
     moved[:, :_POSE, :_POSE] = 0.5 * (corner + corner.swapaxes(1, 2))
@@ -274,13 +285,14 @@ def _turn_rows(moved: Array, rows: Array, step: _Step) -> None:
 def _twist(estimate: BatchEstimate, moved: Array, motions: Motions) -> Array:
     """Return forward speed and turn rate of a step, (runs, 2), scale errors taken off."""
     lasts = motions.dt_s > 0.0
-    time = np.where(lasts, motions.dt_s, 1.0)
-    turn_rate = (1.0 + moved[:, TURN_SCALE]) * motions.turn_rad / time - moved[:, GYRO_BIAS]
-    twist: Array = estimate.twist.copy()
-    for column, rate in (
-        (0, (1.0 + moved[:, SCALE]) * motions.distance_m / time),
-        (1, turn_rate),
-    ):
-        rate = np.where(motions.stands, 0.0, rate)
-        twist[:, column] = np.where(lasts, rate, estimate.twist[:, column])
+    time = motions.dt_s if lasts.all() else np.where(lasts, motions.dt_s, 1.0)
+    twist: Array = np.empty_like(estimate.twist)
+    twist[:, 0] = (1.0 + moved[:, SCALE]) * motions.distance_m / time
+    turn = (1.0 + moved[:, TURN_SCALE]) * motions.turn_rad / time
+    twist[:, 1] = turn - moved[:, GYRO_BIAS]
+    stands = motions.stands
+    if stands.any():
+        twist[stands] = 0.0
+    if not lasts.all():
+        twist[~lasts] = estimate.twist[~lasts]
     return twist
