@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tablerunner.errors import TablerunnerError
 from tablerunner.estimation import LocalizerConfig
 from tablerunner.evaluation.kept_errors import ErrorKeeper, KeptErrors
 from tablerunner.experiments.drive import Drive, drive_route, estimated, uwb_fixes
@@ -206,8 +207,13 @@ def run_situation(situation: str, seeds: Sequence[int], keep: str = 'summary') -
     ------
     ConfigError
         `keep` is not known, or there are no seeds.
+    TablerunnerError
+        Somebody was touched, which a fleet does not feel.
     """
     record = fleet_of(seeds, situation)
+    for seed, free_m in zip(seeds, record.closest_m, strict=True):
+        if free_m <= 0.0:
+            raise TablerunnerError(f'sun2019, seed {seed}: somebody stands in the way')
     track = reckoned(record, odometer())
     truth, counts = record.truth[:, :2], record.counts
     keeper = ErrorKeeper(keep, truth, counts)
