@@ -15,6 +15,7 @@ from tablerunner.bags.storage import Damage
 from tablerunner.bags.streams import Names, bag_records, converters, full_name
 from tablerunner.errors import BagError
 from tablerunner.estimation import Localizer, LocalizerState, Outcome
+from tablerunner.estimation.recording import RecordingLocalizer, Run
 from tablerunner.evaluation.consistency import SourceSummary, summarize_innovations
 from tablerunner.evaluation.errors import ErrorSeries, compare
 from tablerunner.evaluation.truth import Stamps, Truth
@@ -108,6 +109,8 @@ class ReplayResult:
         Times of reception of the first and last message of the bag [ns].
     damage : tuple of Damage
         What of the bag could not be read.
+    runs : tuple of Run
+        Every step of the estimator; empty unless asked for.
     """
 
     estimator: str
@@ -126,6 +129,7 @@ class ReplayResult:
     start: int
     end: int
     damage: tuple[Damage, ...] = ()
+    runs: tuple[Run, ...] = ()
 
     @property
     def data_s(self) -> float:
@@ -209,7 +213,8 @@ class _Replay:
         self._odometer = Odometer(self._config.odometer)
         self._ranger = Ranger(self._config.ranger)
         self._positioner = Positioner(self._config.positioner, anchors)
-        self._localizer = Localizer(self._config.localizer)
+        localizer = RecordingLocalizer if config.keep else Localizer
+        self._localizer = localizer(self._config.localizer)
         self._localizer.set_anchors(anchors)
         self._initialised: int | None = None
         self._first_stamp = 0
@@ -351,4 +356,5 @@ class _Replay:
             self._bag.start,
             self._bag.end,
             self._bag.damage,
+            self._localizer.runs() if isinstance(self._localizer, RecordingLocalizer) else (),
         )

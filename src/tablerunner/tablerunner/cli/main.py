@@ -17,6 +17,7 @@ from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
 from tablerunner.cli.reproduce import reproduce
+from tablerunner.cli.tune import tune
 from tablerunner.errors import BagError, ConfigError, TablerunnerError
 
 GROUP = 'tablerunner.commands'
@@ -37,6 +38,7 @@ def make_app() -> typer.Typer:
     app.command()(replay)
     app.command()(info)
     app.command()(plot)
+    app.command()(tune)
     app.command()(reproduce)
     app.command()(explain_rule)
     app.add_typer(convert_app, name='convert')
