@@ -69,10 +69,10 @@ OUR_BOUND = {'I': Bound(high=0.08, of='median'), 'II': Bound(high=0.10, of='medi
 
 UWB_ERRORS = UwbErrors(
     rate=10.0,
-    range_std=0.108,
+    range_std=0.103,
     bias_std=0.0,
     scale_std=0.0,
-    person_excess=(0.0, 0.5),
+    person_excess=(0.0, 0.57),
     nlos_hold=0.3,
     nlos_std=0.1,
 )
@@ -266,7 +266,7 @@ def localizer(name: str) -> LocalizerConfig:
         estimator=name,
         tag_position=(0.0, 0.0, TAG_HEIGHT_M),
         initial_pose=START,
-        initial_pose_std=(0.05, 0.05, 0.02),
+        initial_pose_std=(0.03, 0.03, 0.02),
         positioner=POSITIONER,
     )
 
