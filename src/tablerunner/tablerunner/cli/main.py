@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from tablerunner.cli.calibrate import calibrate_app
+from tablerunner.cli.compare import compare
 from tablerunner.cli.convert import convert_app
 from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
 from tablerunner.cli.explain_rule import explain_rule
@@ -40,6 +41,7 @@ def make_app() -> typer.Typer:
     app.command()(plot)
     app.command()(tune)
     app.command()(reproduce)
+    app.command()(compare)
     app.command()(explain_rule)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')

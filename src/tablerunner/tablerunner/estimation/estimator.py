@@ -248,7 +248,7 @@ class EstimatorConfig(Config):
         dynamic=True,
     )
     persistence: float = parameter(
-        0.6,
+        1.0,
         description=(
             'Mean innovation of an anchor, in standard deviations, beyond which it has been long '
             'for too long to be chance'
@@ -272,7 +272,7 @@ class EstimatorConfig(Config):
         dynamic=True,
     )
     doubt: float = parameter(
-        0.8,
+        1.0,
         description=(
             'The same for an anchor that has been short: nothing in the way makes it so, and the '
             'pose is doubted'
