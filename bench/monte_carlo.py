@@ -15,7 +15,7 @@ from tablerunner.estimation.batch import BatchEkf, BatchEstimate
 from tablerunner.experiments.sun2019 import run_sun2019
 from tablerunner.odometry.batch import Motions
 
-RUNS = 500
+RUNS = 1000
 STEPS = 100
 SINGLE_STEPS = 1000  # of `filter_step.ours`
 ROUNDS = 5

@@ -1,9 +1,10 @@
 """The default estimator: an extended Kalman filter on ranges with self-calibration.
 
 State: x, y, heading, scale errors of distances and turns, bias of the yaw rate, delay of the
-ranges' stamps, range bias of each anchor (`models.state`). The range biases start with one common
-part and one of each anchor's own, so that the filter learns both from what the geometry shows and
-holds what it does not: an unobservable combination simply keeps its prior covariance.
+ranges' stamps, range bias and range scale of each anchor (`models.state`). The range biases start
+with one common part and one of each anchor's own, so that the filter learns both from what the
+geometry shows and holds what it does not: an unobservable combination simply keeps its prior
+covariance.
 
 What blocks the way makes a range longer, never shorter. So
 
@@ -105,13 +106,15 @@ class Ekf:
         self.lever_arm = lever_arm
         self.state_names = state_names(tuple(anchor.anchor_id for anchor in anchors))
         self._anchors = {anchor.anchor_id: (i, anchor) for i, anchor in enumerate(anchors)}
-        self._size = RANGE_BIAS + len(anchors)
+        self._size = RANGE_BIAS + 2 * len(anchors)
+        self._biases = slice(RANGE_BIAS, RANGE_BIAS + len(anchors))
+        self._scales = slice(RANGE_BIAS + len(anchors), self._size)
         self._calm = (0.0,) * len(anchors)
         self._usual_bias = math.hypot(config.range_bias_common_std, config.range_bias_std)
         walk = np.zeros(self._size)
         walk[GYRO_BIAS] = config.gyro_bias_walk**2
         walk[RANGE_DELAY] = config.range_delay_walk**2
-        walk[RANGE_BIAS:] = config.range_bias_walk**2
+        walk[self._biases] = config.range_bias_walk**2
         self._walk = np.diag(walk)  # for each second
 
     def start(self, start: Start) -> Estimate:
@@ -135,12 +138,13 @@ class Ekf:
         ):
             covariance[index, index] = deviation**2
         if start.range_biases is not None and start.covariance is not None:
-            mean[RANGE_BIAS:] = start.range_biases
+            mean[self._biases] = start.range_biases
             rows = np.r_[0:3, RANGE_BIAS : RANGE_BIAS + count]
             covariance[np.ix_(rows, rows)] = start.covariance
         else:
             covariance[:3, :3] = start.pose_covariance
-            covariance[RANGE_BIAS:, RANGE_BIAS:] = bias_covariance(config, count)
+            covariance[self._biases, self._biases] = bias_covariance(config, count)
+        covariance[self._scales, self._scales] = np.eye(count) * config.range_scale_std**2
         _require_covariance(covariance)
         return Estimate(start.stamp, mean, covariance, memory=self._calm)
 

@@ -214,6 +214,12 @@ class EstimatorConfig(Config):
         high=1.0,
         dynamic=True,
     )
+    range_scale_std: float = parameter(
+        0.005,
+        description="Prior deviation of each anchor's range error in proportion to the distance",
+        low=0.0,
+        high=0.2,
+    )
     default_range_std: float = parameter(
         0.1,
         unit='m',

@@ -31,8 +31,7 @@ from tablerunner.types import Matrix, Vector, seconds
 class BoundModel:
     """What the bound knows: every variance exactly, and nothing that is drawn.
 
-    The state is that of `estimation.models.state`, followed by the relative error of the ranges
-    to each anchor (which real links have and the estimators do not carry).
+    The state is that of `estimation.models.state`.
 
     Attributes
     ----------
@@ -128,8 +127,7 @@ def _ranged(
     model: BoundModel, covariance: Matrix, state: Vector, anchor: int, twist: Twist
 ) -> Matrix:
     place = model.anchors[anchor]
-    distance, slope = predict_range(state, place, model.lever_arm, anchor, twist)
-    slope[RANGE_BIAS + len(model.anchors) + anchor] = distance
+    _, slope = predict_range(state, place, model.lever_arm, anchor, twist)
     cross = covariance @ slope
     corrected: Matrix = covariance - np.outer(
         cross, cross / (float(slope @ cross) + model.range_std**2)

@@ -20,7 +20,7 @@ from tablerunner.evaluation.truth import Truth
 from tablerunner.experiments.belief import Belief, Sensed, believe, sense
 from tablerunner.experiments.drive import Drive, Route, drive_route
 from tablerunner.experiments.experiment import Progress
-from tablerunner.experiments.matched import Way, bound_model, matched
+from tablerunner.experiments.matched import bound_model, matched
 from tablerunner.experiments.seeds import run_seeds
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import Scenario
@@ -66,15 +66,9 @@ class Setup:
             raise ConfigError('--speed', self.speed, fastest)
 
     @property
-    def way(self) -> Way:
-        """The start and the route."""
-        start = self.scenario.start_pose
-        return Way(((start.x, start.y), *self.route), self.speed)
-
-    @property
     def settings(self) -> ReplayConfig:
         """Settings of everything that estimates."""
-        return self.config or matched(self.scenario, self.way)
+        return self.config or matched(self.scenario, self.speed)
 
 
 @dataclass(frozen=True)
@@ -211,7 +205,7 @@ def one_seed(seed: int, setup: Setup) -> Seed:
     clear = [item for item in exchanges if not item.lost and not item.blocked_by]
     index = {anchor.id: row for row, anchor in enumerate(setup.scenario.anchors)}
     bound = posterior_bound(
-        bound_model(setup.scenario, setup.way, START_STD),
+        bound_model(setup.scenario, setup.speed, START_STD),
         truth,
         np.array([item.stamp for item in clear], dtype=np.int64),
         [index[item.anchor_id] for item in clear],

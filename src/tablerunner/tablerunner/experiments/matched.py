@@ -14,7 +14,7 @@ estimator's own and not a wrong guess of noise. The simulation draws its errors 
 | bias of the gyroscope, its walk | `gyro_bias_std`, `gyro_bias_walk` |
 | noise of ranges, ticks of the timestamps | `RangerConfig.range_std` |
 | constant error of each anchor | `range_bias_std` |
-| error in proportion to the range | more `range_bias_std`, and `range_bias_walk` as it changes |
+| error in proportion to the range | `range_scale_std` |
 | none: all stamps are exact | `range_delay_std` is zero |
 | powers in and out of sight | `nlos_gap_centre`, `nlos_gap_width` |
 """
@@ -22,7 +22,7 @@ estimator's own and not a wrong guess of noise. The simulation draws its errors 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -53,32 +53,10 @@ _RANGE_WEIGHTS = (0.25, 0.5, 0.25)
 """What each of the three receptions of an exchange weighs in its range."""
 
 
-@dataclass(frozen=True)
-class Way:
-    """What of a route matters for matching.
-
-    Attributes
-    ----------
-    points : tuple of (x, y)
-        The start and the points after it [m].
-    speed : float
-        [m/s].
-    """
-
-    points: tuple[tuple[float, float], ...]
-    speed: float
-
-    @property
-    def leg_m(self) -> float:
-        """Mean distance from a point to the next [m]."""
-        legs = np.linalg.norm(np.diff(np.array(self.points), axis=0), axis=1)
-        return float(np.mean(legs[legs > 0.0])) if np.any(legs > 0.0) else 0.0
-
-
-def matched(scenario: Scenario, way: Way) -> ReplayConfig:
+def matched(scenario: Scenario, speed: float) -> ReplayConfig:
     """Return the settings of odometry, ranging and localisation that fit a scenario."""
     config = ReplayConfig.from_scenario(scenario)
-    noise = motion_noise(scenario, way.speed)
+    noise = motion_noise(scenario, speed)
     ranging = replace(config.ranger, range_std=range_std(scenario.sensors))
     if is_clear(scenario):
         ranging = replace(ranging, nlos_test='none')
@@ -93,12 +71,12 @@ def matched(scenario: Scenario, way: Way) -> ReplayConfig:
             noise=noise,
             slip=replace(
                 config.odometer.slip,
-                rate=max(config.odometer.slip.rate, slip_rate(scenario, way.speed)),
+                rate=max(config.odometer.slip.rate, slip_rate(scenario, speed)),
             ),
         ),
         localizer=replace(
             config.localizer,
-            filter=estimator_config(config.localizer.filter, scenario, way, noise),
+            filter=estimator_config(config.localizer.filter, scenario, noise),
         ),
     )
 
@@ -175,18 +153,14 @@ def nlos_gap(errors: SensorErrors) -> tuple[float, float]:
 
 
 def estimator_config(
-    config: EstimatorConfig, scenario: Scenario, way: Way, noise: MotionNoise
+    config: EstimatorConfig, scenario: Scenario, noise: MotionNoise
 ) -> EstimatorConfig:
     """Return priors and walks of the filters.
 
-    A slip only ever loses: its mean share is put into the prior of the scale. The error of a
-    range in proportion to it, deviation k, is a bias of k d at the mean square distance d; over a
-    leg of length L in any direction it changes by k L / sqrt(2), and the walk of the bias is what
-    reaches that variance in the time of a leg.
+    A slip only ever loses: its mean share is put into the prior of the scale.
     """
     wheels, imu, uwb = scenario.sensors.wheels, scenario.sensors.imu, scenario.sensors.uwb
     lost = 0.5 * wheels.slip_rate * wheels.slip_duration * wheels.slip_share
-    changed = uwb.scale_std * math.sqrt(0.5 * way.leg_m * way.speed)
     return replace(
         config,
         motion=noise,
@@ -199,23 +173,25 @@ def estimator_config(
         range_delay_std=0.0,
         range_delay_walk=0.0,
         range_bias_common_std=0.0,
-        range_bias_std=math.hypot(uwb.bias_std, uwb.scale_std * _far(scenario, way)),
-        range_bias_walk=changed,
+        range_bias_std=uwb.bias_std,
+        range_bias_walk=0.0,
+        range_scale_std=uwb.scale_std,
     )
 
 
-def bound_model(scenario: Scenario, way: Way, start_std: tuple[float, ...]) -> BoundModel:
+def bound_model(scenario: Scenario, speed: float, start_std: tuple[float, ...]) -> BoundModel:
     """Return what the bound knows of a scenario: the same variances, and the model of the ranges.
 
     Parameters
     ----------
     scenario : Scenario
-    way : Way
+    speed : float
+        [m/s].
     start_std : tuple
         Deviations of x, y [m], heading [rad] at the start.
     """
-    noise = motion_noise(scenario, way.speed)
-    config = estimator_config(EstimatorConfig(), scenario, way, noise)
+    noise = motion_noise(scenario, speed)
+    config = estimator_config(EstimatorConfig(), scenario, noise)
     count = len(scenario.anchors)
     prior: Matrix = np.zeros((RANGE_BIAS + 2 * count,) * 2)
     prior[:3, :3] = np.diag(np.square(start_std))
@@ -224,11 +200,9 @@ def bound_model(scenario: Scenario, way: Way, start_std: tuple[float, ...]) -> B
     prior[RANGE_DELAY, RANGE_DELAY] = config.range_delay_std**2
     prior[GYRO_BIAS, GYRO_BIAS] = config.gyro_bias_std**2
     biases = slice(RANGE_BIAS, RANGE_BIAS + count)
-    uwb = scenario.sensors.uwb
-    exact = replace(config, range_bias_std=uwb.bias_std)
-    prior[biases, biases] = bias_covariance(exact, count)
+    prior[biases, biases] = bias_covariance(config, count)
     scales = slice(RANGE_BIAS + count, RANGE_BIAS + 2 * count)
-    prior[scales, scales] = np.eye(count) * uwb.scale_std**2
+    prior[scales, scales] = np.eye(count) * config.range_scale_std**2
     walk = np.zeros(len(prior))
     walk[GYRO_BIAS] = config.gyro_bias_walk**2
     return BoundModel(
@@ -239,12 +213,3 @@ def bound_model(scenario: Scenario, way: Way, start_std: tuple[float, ...]) -> B
         walk,
         range_std(scenario.sensors),
     )
-
-
-def _far(scenario: Scenario, way: Way) -> float:
-    """Return the root mean square distance from the points of a way to the anchors [m]."""
-    points = np.array(way.points)
-    anchors = np.array([anchor.position for anchor in scenario.anchors])
-    off = points[:, None] - anchors[:, :2]
-    height = anchors[:, 2] - scenario.robot.tag_position[2]
-    return float(np.sqrt(np.mean(np.sum(off**2, axis=-1) + height**2)))

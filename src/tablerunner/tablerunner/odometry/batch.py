@@ -199,11 +199,11 @@ def _angles(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return the integral of the yaw rate at each stamp, (k, runs), and where it is fresh, (k,).
 
-    The trapezoid between samples, the last rate held beyond the newest.
+    A reading is the mean rate since the one before; beyond the newest it is held.
     """
     timeout = nanoseconds(config.timeout)
     gaps = np.diff(imu_stamps)
-    steps = 0.5 * (yaw_rate[1:] + yaw_rate[:-1]) * (gaps / NANOSECONDS)[:, None]
+    steps = yaw_rate[1:] * (gaps / NANOSECONDS)[:, None]
     steps[gaps > timeout] = 0.0
     summed = np.concatenate([np.zeros_like(yaw_rate[:1]), np.cumsum(steps, axis=0)])
     newest = np.searchsorted(imu_stamps, stamps, side='left') - 1

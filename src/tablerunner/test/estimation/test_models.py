@@ -23,6 +23,8 @@ STATES = st.tuples(
     st.floats(-0.1, 0.1),
     st.floats(-0.3, 0.3),
     st.floats(-0.3, 0.3),
+    st.floats(-0.05, 0.05),
+    st.floats(-0.05, 0.05),
 ).map(np.array)
 TWISTS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.5, 1.5))
 MOTIONS = st.builds(Motion, st.floats(0.001, 0.3), st.floats(-0.5, 0.5), st.floats(0.01, 0.2))
@@ -89,7 +91,7 @@ def test_move_many_equals_move(mean, motion):
 
 def test_move_at_standstill_holds_the_heading_against_the_bias():
     """Where odometry says nothing moved, the gyro's bias turns nothing."""
-    mean = np.array([1.0, 2.0, 0.5, 0.01, 0.01, 0.02, 0.0, 0.1])
+    mean = np.array([1.0, 2.0, 0.5, 0.01, 0.01, 0.02, 0.0, 0.1, 0.01])
     moved, by_state, _ = move(mean, Motion(0.0, 0.0, 10.0))
     assert np.array_equal(moved, mean)
     assert np.array_equal(by_state, np.eye(len(mean)))
@@ -119,7 +121,7 @@ def test_predict_range_many_equals_predict_range(mean, twist):
 
 def test_predict_range_of_late_stamps_is_where_the_robot_was():
     """At 0.5 m/s away from the anchor, a stamp 0.1 s late has read 5 cm less."""
-    mean = np.zeros(8)
+    mean = np.zeros(9)
     mean[RANGE_DELAY] = 0.1
     expected, _ = predict_range(mean, (-10.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, (0.5, 0.0))
     assert expected == pytest.approx(9.95)
@@ -127,8 +129,8 @@ def test_predict_range_of_late_stamps_is_where_the_robot_was():
 
 def test_predict_range_adds_the_bias_of_its_own_anchor():
     """A tag 3-4-12 away reads 13 and its bias; a tag on the anchor has no direction."""
-    mean = np.array([3.0, 4.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.2])
-    assert predict_range(mean, (0, 0, 12), (0, 0, 0), 1)[0] == pytest.approx(13.2)
+    mean = np.array([3.0, 4.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.0, 0.01])
+    assert predict_range(mean, (0, 0, 12), (0, 0, 0), 1)[0] == pytest.approx(13.33)
     touching, jacobian = predict_range(mean, (3, 4, 0), (0, 0, 0), 0)
     assert touching == pytest.approx(0.1)
     assert np.all(jacobian[:3] == 0.0)

@@ -204,6 +204,7 @@ def drawn_run(room, name, seed):
     scale = rng.normal(0, CONFIG.scale_std)
     drift, turning = rng.normal(0, CONFIG.gyro_bias_std), rng.normal(0, CONFIG.turn_scale_std)
     biases = rng.multivariate_normal(np.zeros(4), bias_covariance(CONFIG, 4))
+    stretch = rng.normal(0, CONFIG.range_scale_std, 4)
     mean = np.array([6.0, 4.5, 2.9])
     true = Pose2(*(mean + rng.normal(0, PRIOR)))
     estimator = ESTIMATORS[name](CONFIG, room.anchors, room.lever)
@@ -227,7 +228,7 @@ def drawn_run(room, name, seed):
         anchor = room.anchors[k % 4]
         tag = true.transform(np.array(room.lever[:2]))
         measured = math.dist((*tag, room.lever[2]), anchor.position)
-        measured += biases[k % 4] + rng.normal(0, 0.1)
+        measured += stretch[k % 4] * measured + biases[k % 4] + rng.normal(0, 0.1)
         sample = RangeSample(k + 1, anchor.anchor_id, 'tag', k, measured, 0.01)
         estimate, _ = estimator.update(estimate, sample)
         steps.append(Step(k + 1, told, sample, estimate))

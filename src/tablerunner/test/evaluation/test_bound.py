@@ -126,7 +126,7 @@ def test_states_that_walk_lose_certainty_with_time():
     assert last[HEADING, HEADING] == pytest.approx(1e-8 * 100.0**3 / 3.0, rel=0.003)
 
 
-CONFIG = EstimatorConfig(huber=100.0, gate=1e6, persistence=4.0, range_delay_std=0.0)
+CONFIG = EstimatorConfig(huber=100.0, gate=1e6, persistence=4.0, doubt=4.0, range_delay_std=0.0)
 PRIOR = np.array([0.2, 0.2, 0.1])
 LEVER = (-0.1, 0.05, 1.1)
 STEPS = 400
@@ -141,7 +141,7 @@ BOUND = BoundModel(
 
 
 def bound_of_config():
-    """Return the model of `CONFIG`, in which ranges have no error of scale and nothing walks."""
+    """Return the model of `CONFIG`, in which nothing walks."""
     prior = np.zeros((RANGE_BIAS + 8, RANGE_BIAS + 8))
     prior[:3, :3] = np.diag(PRIOR**2)
     for index, deviation in (
@@ -151,6 +151,7 @@ def bound_of_config():
     ):
         prior[index, index] = deviation**2
     prior[RANGE_BIAS : RANGE_BIAS + 4, RANGE_BIAS : RANGE_BIAS + 4] = bias_covariance(CONFIG, 4)
+    prior[RANGE_BIAS + 4 :, RANGE_BIAS + 4 :] = np.eye(4) * CONFIG.range_scale_std**2
     return replace(BOUND, prior=prior)
 
 
@@ -173,6 +174,7 @@ def drawn(seed, exact=False):
     share = 0.0 if exact else 1.0
     scale = share * rng.normal(0, STILL.scale_std)
     turn_scale = share * rng.normal(0, STILL.turn_scale_std)
+    range_scales = share * rng.normal(0, STILL.range_scale_std, 4)
     drift = share * rng.normal(0, STILL.gyro_bias_std)
     biases = share * rng.multivariate_normal(np.zeros(4), bias_covariance(STILL, 4))
     start = np.array([6.0, 4.5, 0.3])
@@ -201,6 +203,7 @@ def drawn(seed, exact=False):
         anchor = anchors[k % 4]
         tag = true.transform(np.array(LEVER[:2]))
         measured = math.dist((*tag, LEVER[2]), anchor.position)
+        measured += range_scales[k % 4] * measured
         measured += biases[k % 4] + share * rng.normal(0, 0.1)
         sample = RangeSample(stamp, anchor.anchor_id, 'tag', k, measured, 0.01)
         estimate, _ = ekf.update(estimate, sample)

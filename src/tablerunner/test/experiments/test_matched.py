@@ -9,7 +9,6 @@ import pytest
 from tablerunner.bags.replay_config import ReplayConfig
 from tablerunner.estimation.models.state import RANGE_BIAS, TURN_SCALE
 from tablerunner.experiments.matched import (
-    Way,
     bound_model,
     is_clear,
     matched,
@@ -35,7 +34,7 @@ from tablerunner.simulation.radio import GAP_DB
 from tablerunner.types import Velocity
 from tablerunner.uwb.ranging import nlos_probability
 
-WAY = Way(((0.0, 0.0), (0.0, 6.0), (8.0, 6.0)), 0.5)
+SPEED = 0.5
 WALLS = (Wall(((-1.0, -1.0), (9.0, -1.0), (9.0, 7.0), (-1.0, 7.0)), 'outer', closed=True),)
 ROOM = Scenario(name='room', walls=WALLS, anchors=(AnchorPlace('A', (3.0, 4.0, 1.1)),))
 
@@ -119,24 +118,19 @@ def test_nlos_curve_is_the_odds_of_the_simulated_powers():
 
 
 def test_priors_are_the_spreads_of_the_scenario():
-    config = matched(of(), WAY).localizer.filter
+    config = matched(of(), SPEED).localizer.filter
     errors = SensorErrors()
     assert config.turn_scale_std == errors.imu.gyro_scale_std
     assert config.gyro_bias_std == errors.imu.gyro_bias_std
     assert config.scale_std == pytest.approx(
         errors.wheels.radius_scale_std / math.sqrt(2), rel=0.1
     )
-    # The anchor is 5 m from the start, sqrt(13) and sqrt(29) m from the other points.
-    far = math.sqrt((25.0 + 13.0 + 29.0) / 3.0)
-    expected = math.hypot(errors.uwb.bias_std, errors.uwb.scale_std * far)
-    assert config.range_bias_std == pytest.approx(expected)
-    assert config.range_bias_walk == pytest.approx(
-        errors.uwb.scale_std * math.sqrt(0.5 * 7.0 * 0.5)
-    )
+    assert config.range_bias_std == errors.uwb.bias_std
+    assert config.range_scale_std == errors.uwb.scale_std
 
 
 def test_bound_knows_the_prior_of_every_state_and_no_more():
-    model = bound_model(of(), WAY, (0.05, 0.06, 0.02))
+    model = bound_model(of(), SPEED, (0.05, 0.06, 0.02))
     errors = SensorErrors()
     deviations = np.sqrt(np.diag(model.prior))
     np.testing.assert_allclose(deviations[:3], [0.05, 0.06, 0.02])
@@ -149,9 +143,9 @@ def test_bound_knows_the_prior_of_every_state_and_no_more():
 def test_clear_room_is_told_so():
     """Where nothing can block, nothing is looked for; elsewhere powers are judged."""
     assert is_clear(ROOM)
-    assert matched(ROOM, WAY).ranger.nlos_test == 'none'
+    assert matched(ROOM, SPEED).ranger.nlos_test == 'none'
     peopled = ROOM.replace(people=(Person('somebody', ((4.0, 3.0),)),))
     assert not is_clear(peopled)
-    assert matched(peopled, WAY).ranger.nlos_test == ReplayConfig().ranger.nlos_test
+    assert matched(peopled, SPEED).ranger.nlos_test == ReplayConfig().ranger.nlos_test
     screen = Wall(((0.0, 3.0), (4.0, 3.0)), 'screen')
     assert not is_clear(replace(ROOM, walls=(*WALLS, screen)))

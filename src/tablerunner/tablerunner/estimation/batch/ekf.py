@@ -26,6 +26,7 @@ from tablerunner.estimation.models.state import (
     TURN_SCALE,
     X,
     Y,
+    range_scale,
 )
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.batch import Motions, variances
@@ -67,10 +68,10 @@ class BatchEkf:
         self._lever_arm = lever_arm
         self._single = Ekf(config, anchors, lever_arm)
         self._usual_bias = math.hypot(config.range_bias_common_std, config.range_bias_std)
-        walk = np.zeros(RANGE_BIAS + len(anchors))
+        walk = np.zeros(RANGE_BIAS + 2 * len(anchors))
         walk[GYRO_BIAS] = config.gyro_bias_walk**2
         walk[RANGE_DELAY] = config.range_delay_walk**2
-        walk[RANGE_BIAS:] = config.range_bias_walk**2
+        walk[RANGE_BIAS : RANGE_BIAS + len(anchors)] = config.range_bias_walk**2
         self._walk = walk  # for each second
 
     def start(self, start: Start, runs: int) -> BatchEstimate:
@@ -228,7 +229,9 @@ class BatchEkf:
         tag_x, tag_y = cos * ahead - sin * arm_y, sin * ahead + cos * arm_y
         dx, dy = mean[:, X] + tag_x - anchor[0], mean[:, Y] + tag_y - anchor[1]
         distance = np.sqrt(dx * dx + dy * dy + (self._lever_arm[2] - anchor[2]) ** 2)
-        away = 1.0 / np.where(distance > NEAREST_M, distance, np.inf)
+        bias, scale = RANGE_BIAS + index, range_scale(mean.shape[1]) + index
+        grown = 1.0 + mean[:, scale]
+        away = grown / np.where(distance > NEAREST_M, distance, np.inf)
         ux, uy = dx * away, dy * away
         along, aside = speed - turn_rate * arm_y, turn_rate * arm_x
         slopes = (
@@ -239,15 +242,15 @@ class BatchEkf:
                 RANGE_DELAY,
                 -(ux * (cos * along - sin * aside) + uy * (sin * along + cos * aside)),
             ),
+            (scale, distance),
         )
-        bias = RANGE_BIAS + index
         cross = estimate.covariance[:, :, bias].copy(order='K')
         for column, slope in slopes:
             cross += estimate.covariance[:, :, column] * slope[:, None]
         variance = cross[:, bias].copy(order='K')
         for column, slope in slopes:
             variance += slope * cross[:, column]
-        return _Expected(distance + mean[:, bias], variance, cross)
+        return _Expected(grown * distance + mean[:, bias], variance, cross)
 
 
 def _wrapped(heading: Array) -> Array:

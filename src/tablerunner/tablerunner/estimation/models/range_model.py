@@ -1,8 +1,9 @@
 """What an anchor at a known place reads: the distance to the tag, and its bias.
 
-h = |p(t - d) + R(heading(t - d)) l - a| + bias, in three dimensions, with p the base, l the tag's
-lever arm, a the anchor, and d the delay of the stamps, over which the robot moved on with the
-velocity that it had. Heights count: anchors hang well above the tag.
+h = (1 + k) |p(t - d) + R(heading(t - d)) l - a| + bias, in three dimensions, with p the base, l
+the tag's lever arm, a the anchor, k and bias the anchor's own errors, and d the delay of the
+stamps, over which the robot moved on with the velocity that it had. Heights count: anchors hang
+well above the tag.
 """
 
 from __future__ import annotations
@@ -11,7 +12,14 @@ import math
 
 import numpy as np
 
-from tablerunner.estimation.models.state import HEADING, RANGE_BIAS, RANGE_DELAY, X, Y
+from tablerunner.estimation.models.state import (
+    HEADING,
+    RANGE_BIAS,
+    RANGE_DELAY,
+    X,
+    Y,
+    range_scale,
+)
 from tablerunner.types import Matrix, Vector
 
 Point3 = tuple[float, float, float]
@@ -37,7 +45,7 @@ def predict_range(
     lever_arm : tuple
         Tag in base_link [m].
     bias_index : int
-        Which of the range biases belongs to this anchor.
+        Which of the range biases, and of the range scales, belongs to this anchor.
     twist : tuple
         Forward speed [m/s] and turn rate [rad/s] of base_link.
 
@@ -46,8 +54,8 @@ def predict_range(
     expected : float
         Range [m].
     jacobian : ndarray, shape (n,)
-        d(range)/d(state); units 1, 1, m/rad, 0 ... m/s, 0 ... 1. Zero towards an anchor that the
-        tag touches.
+        d(range)/d(state); units 1, 1, m/rad, 0 ... m/s, 0 ... 1, 0 ... m. Zero towards an anchor
+        that the tag touches.
     """
     # Plain floats: this runs for every range, and reading an array element costs ten times more.
     x, y, heading, _, _, _, delay = mean[:RANGE_BIAS].tolist()
@@ -63,9 +71,12 @@ def predict_range(
     tag_x, tag_y = cos * ahead - sin * arm_y, sin * ahead + cos * arm_y
     dx, dy, dz = x + tag_x - anchor[0], y + tag_y - anchor[1], arm_z - anchor[2]
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-    jacobian = np.zeros(len(mean))
+    size = len(mean)
+    jacobian = np.zeros(size)
+    row = range_scale(size) + bias_index
+    grown = 1.0 + float(mean[row])
     if distance > NEAREST_M:
-        ux, uy = dx / distance, dy / distance
+        ux, uy = grown * dx / distance, grown * dy / distance
         jacobian[X] = ux
         jacobian[Y] = uy
         jacobian[HEADING] = uy * tag_x - ux * tag_y
@@ -75,7 +86,8 @@ def predict_range(
             ux * (cos * along - sin * aside) + uy * (sin * along + cos * aside)
         )
     jacobian[RANGE_BIAS + bias_index] = 1.0
-    return distance + float(mean[RANGE_BIAS + bias_index]), jacobian
+    jacobian[row] = distance
+    return grown * distance + float(mean[RANGE_BIAS + bias_index]), jacobian
 
 
 def predict_range_many(
@@ -101,4 +113,5 @@ def predict_range_many(
     dy = means[:, Y] - twist[0] * delay * np.sin(heading) + sin * lever_arm[0] + cos * lever_arm[1]
     dz = lever_arm[2] - anchor[2]
     distance = np.sqrt((dx - anchor[0]) ** 2 + (dy - anchor[1]) ** 2 + dz**2)
-    return np.asarray(distance + means[:, RANGE_BIAS + bias_index])
+    grown = 1.0 + means[:, range_scale(means.shape[1]) + bias_index]
+    return np.asarray(grown * distance + means[:, RANGE_BIAS + bias_index])
