@@ -65,7 +65,7 @@ from tablerunner.types import (
 LONG, SHORT = 'long for a while', 'short for a while'
 """Why a range was taken as it was: its anchor's mean innovation is no chance."""
 
-_CLIP = 4.0
+CLIP = 4.0
 """One wild reading does not make an anchor's mean [standard deviations]."""
 
 
@@ -282,7 +282,7 @@ class Ekf:
             # What has been learned of this anchor was something in the way, which is gone.
             estimate = self._forget_bias(estimate, index)
             return self._update_range(estimate, sample)
-        clipped = min(max(deviations, -_CLIP), _CLIP)
+        clipped = min(max(deviations, -CLIP), CLIP)
         memory[index] = persistent = persistent + config.persistence_share * (clipped - persistent)
         nis = deviations * deviations
         accepted, reason = nis <= config.gate, ''

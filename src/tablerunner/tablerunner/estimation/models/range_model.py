@@ -28,7 +28,7 @@ Twist = tuple[float, float]
 
 STANDING: Twist = (0.0, 0.0)
 
-_NEAREST_M = 1e-6  # closer, the direction to the anchor is noise
+NEAREST_M = 1e-6  # closer, the direction to the anchor is noise
 
 
 def predict_range(
@@ -75,7 +75,7 @@ def predict_range(
     jacobian = np.zeros(size)
     row = range_scale(size) + bias_index
     grown = 1.0 + float(mean[row])
-    if distance > _NEAREST_M:
+    if distance > NEAREST_M:
         ux, uy = grown * dx / distance, grown * dy / distance
         jacobian[X] = ux
         jacobian[Y] = uy
