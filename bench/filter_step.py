@@ -78,7 +78,7 @@ def filterpy(count: int, stacked: bool = False) -> ExtendedKalmanFilter:
     walk[TURN_SCALE] = CONFIG.turn_scale_walk**2 * MOTION.turn_rad
     walk[GYRO_BIAS] = CONFIG.gyro_bias_walk**2 * MOTION.dt_s
     walk[RANGE_DELAY] = CONFIG.range_delay_walk**2 * MOTION.dt_s
-    walk[RANGE_BIAS:] = CONFIG.range_bias_walk**2 * MOTION.dt_s
+    walk[RANGE_BIAS : RANGE_BIAS + 4] = CONFIG.range_bias_walk**2 * MOTION.dt_s
     variances = CONFIG.motion.variances(MOTION)
     moved = ekf.x
 
@@ -149,11 +149,11 @@ def measure() -> Iterator[Result]:
         reference,
         one / reference,
         'us',
-        'predict and one range, 11 states; reference: filterpy on the same model',
+        'predict and one range, 15 states; reference: filterpy on the same model',
         bound=1.0,
     )
     four, reference, stacked = compare(4)
-    what = 'predict and four ranges of one instant, 11 states; equal to 1e-9; reference: filterpy'
+    what = 'predict and four ranges of one instant, 15 states; equal to 1e-9; reference: filterpy'
     yield Result(
         'ekf step with four ranges',
         four,

@@ -14,6 +14,7 @@ import filter_step
 import fuzzy
 import latency
 import memory
+import monte_carlo
 import offline
 import processor
 import solvers
@@ -23,6 +24,7 @@ from rich.table import Table
 
 BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'filter': filter_step.measure,
+    'monte_carlo': monte_carlo.measure,
     'solvers': solvers.measure,
     'offline': offline.measure,
     'latency': latency.measure,
@@ -30,7 +32,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'memory': memory.measure,
     'fuzzy': fuzzy.measure,
 }
-WITH_BAR = {'solvers'}
+WITH_BAR = {'solvers', 'monte_carlo'}
 """Those that show a bar of their own, with which a spinner would fight for the line."""
 
 

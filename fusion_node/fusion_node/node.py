@@ -10,15 +10,24 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from sensor_msgs.msg import MagneticField
 
 from fusion_node.output import EstimateOutput
 from fusion_node.params import FusionNodeConfig
-from tablerunner.estimation import Localizer, LocalizerConfig, LocalizerState, Outcome
+from fusion_node.services import FusionServices
+from tablerunner.estimation import (
+    Localizer,
+    LocalizerConfig,
+    LocalizerState,
+    Outcome,
+    SmootherConfig,
+)
 from tablerunner.types import Refusal
 from tablerunner_interfaces.msg import Innovation as InnovationMessage
 from tablerunner_interfaces.msg import UwbAnchorArray, UwbRange
 from tablerunner_ros.conversions.anchors import anchors_from_message
-from tablerunner_ros.conversions.innovation import innovation_to_message
+from tablerunner_ros.conversions.imu import magnetic_from_message
+from tablerunner_ros.conversions.innovation import innovation_to_message, refusal_to_message
 from tablerunner_ros.conversions.odometry import odometry_from_message
 from tablerunner_ros.conversions.pose import pose_from_message
 from tablerunner_ros.conversions.uwb_range import range_from_message
@@ -29,6 +38,8 @@ from tablerunner_ros.spin import spin_node
 from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
 
 ODOM, RANGES, ANCHORS, START = 'odom', 'uwb/ranges', 'uwb/anchors', 'initialpose'
+MAGNETIC = 'imu/mag'
+FIX = 'uwb/pose'  # also made of ranges inside, for estimators that take positions
 
 _LEVELS = {
     LocalizerState.WAITING: WARN,
@@ -54,8 +65,12 @@ class FusionNode(Node):
             declare_config(self, LocalizerConfig, on_change=self._configure)
         )
         self._twist_covariance = np.zeros((2, 2))
+        self._measured = {RANGES, FIX, *config.pose_sources}
         self._output = EstimateOutput(
             self, config.map_frame, config.odom_frame, config.base_frame, config.publish_tf
+        )
+        self._output.configure(
+            declare_config(self, SmootherConfig, on_change=self._output.configure)
         )
         self._innovations = self.create_publisher(
             InnovationMessage, 'innovations', qos_for('innovations')
@@ -65,15 +80,31 @@ class FusionNode(Node):
         self._diagnostics.describe(self._describe)
         self._subscribe(Odometry, ODOM, self._on_odometry)
         self._subscribe(UwbAnchorArray, ANCHORS, self._on_anchors)
-        self._subscribe(PoseWithCovarianceStamped, START, self._on_start)
+        self._subscribe(PoseWithCovarianceStamped, START, partial(self._start, START))
         if config.use_ranges:
             self._diagnostics.watch(RANGES, config.silence)
-            self._subscribe(UwbRange, RANGES, self._on_range)
+            self._listen(UwbRange, RANGES, range_from_message, self._localizer.add_range)
         for topic in config.pose_sources:
-            self._subscribe(PoseWithCovarianceStamped, topic, partial(self._on_pose, topic))
+            convert = partial(pose_from_message, frame=config.map_frame, source=topic)
+            self._listen(PoseWithCovarianceStamped, topic, convert, self._localizer.add_pose)
+        if self._localizer.config.compass.use:
+            self._measured.add(MAGNETIC)
+            convert = partial(magnetic_from_message, mount_heading=config.imu_heading)
+            self._listen(MagneticField, MAGNETIC, convert, self._localizer.add_magnetic)
+        FusionServices(self, self._localizer, self._start)
 
     def _subscribe(self, type_: type[Any], topic: str, callback: Callable[[Any], None]) -> None:
         self.create_subscription(type_, topic, callback, qos_for(topic, subscriber=True))
+
+    def _listen(
+        self,
+        type_: type[Any],
+        topic: str,
+        convert: Callable[[Any], Any],
+        take: Callable[[Any], Outcome],
+    ) -> None:
+        """Subscribe to a topic of measurements: convert, one call, publish, count."""
+        self._subscribe(type_, topic, partial(self._on_sample, topic, convert, take))
 
     def _on_odometry(self, message: Odometry) -> None:
         config = self._config
@@ -85,53 +116,63 @@ class FusionNode(Node):
         self._publish(outcome)
         place = self._localizer.map_to_odom
         if place is not None and outcome.estimate is not None:
-            self._output.transform(outcome.estimate.stamp, place)
+            self._output.transform(outcome.estimate, place, self._localizer.starts)
         self._count(outcome, ODOM, sample.stamp)
 
-    def _on_range(self, message: UwbRange) -> None:
-        sample = range_from_message(message)
-        if self._refused(sample, RANGES):
+    def _on_sample(
+        self,
+        source: str,
+        convert: Callable[[Any], Any],
+        take: Callable[[Any], Outcome],
+        message: Any,
+    ) -> None:
+        sample = convert(message)
+        if self._refused(sample, source):
             return
-        outcome = self._localizer.add_range(sample)
+        outcome = take(sample)
         self._publish(outcome)
-        self._count(outcome, RANGES, sample.stamp)
+        self._count(outcome, source, sample.stamp)
 
-    def _on_pose(self, topic: str, message: PoseWithCovarianceStamped) -> None:
-        sample = pose_from_message(message, self._config.map_frame, topic)
-        if self._refused(sample, topic):
-            return
-        outcome = self._localizer.add_pose(sample)
-        self._publish(outcome)
-        self._count(outcome, topic, sample.stamp)
-
-    def _on_start(self, message: PoseWithCovarianceStamped) -> None:
-        sample = pose_from_message(message, self._config.map_frame, START)
-        if self._refused(sample, START):
-            return
+    def _start(self, source: str, message: PoseWithCovarianceStamped) -> str:
+        """Begin anew at a pose that a user gives; return why not, or nothing."""
+        sample = pose_from_message(message, self._config.map_frame, source)
+        refusal = self._refused(sample, source)
+        if refusal is not None:
+            return refusal.reason
         outcome = self._localizer.set_pose(sample)
         self._publish(outcome)
-        self._count(outcome, START, sample.stamp)
-        if not outcome.refusals:
-            self.get_logger().info('started anew at the pose given by initialpose')
+        self._count(outcome, source, sample.stamp)
+        if outcome.refusals:
+            return outcome.refusals[0].reason
+        self.get_logger().info(f'started anew at the pose given by {source}')
+        return ''
 
     def _on_anchors(self, message: UwbAnchorArray) -> None:
         anchors = anchors_from_message(message, self._config.map_frame)
         if isinstance(anchors, Refusal):
-            self._diagnostics.refuse(anchors)
+            self._refuse(anchors)
             return
         self._localizer.set_anchors(anchors)
         self._diagnostics.take(ANCHORS)
 
-    def _refused(self, sample: Any, source: str) -> bool:
-        """Count what was refused in converting it, or for a stamp ahead of the clock."""
-        if isinstance(sample, Refusal):
-            self._diagnostics.refuse(sample)
-            return True
-        if self._stamps.is_future(sample.stamp):
-            key = getattr(sample, 'anchor_id', '')
-            self._diagnostics.refuse(Refusal(sample.stamp, source, key, FUTURE))
-            return True
-        return False
+    def _refused(self, sample: Any, source: str) -> Refusal | None:
+        """Count and return what was refused in converting it, or for a stamp in the future."""
+        refusal = sample if isinstance(sample, Refusal) else None
+        if refusal is None and self._stamps.is_future(sample.stamp):
+            refusal = Refusal(sample.stamp, source, getattr(sample, 'anchor_id', ''), FUTURE)
+        if refusal is not None:
+            self._refuse(refusal)
+        return refusal
+
+    def _refuse(self, refusal: Refusal) -> None:
+        """Count a refusal; one of a measurement that no estimator saw is told as an innovation."""
+        self._diagnostics.refuse(refusal)
+        if refusal.source in self._measured:
+            self._innovations.publish(
+                refusal_to_message(
+                    refusal, self._config.map_frame, self._localizer.config.estimator
+                )
+            )
 
     def _publish(self, outcome: Outcome) -> None:
         estimate = outcome.estimate
@@ -155,7 +196,7 @@ class FusionNode(Node):
                 )
                 return
         for refusal in outcome.refusals:
-            self._diagnostics.refuse(refusal)
+            self._refuse(refusal)
         if not outcome.refusals:
             self._diagnostics.take(source, stamp)
 
@@ -164,8 +205,9 @@ class FusionNode(Node):
 
     def _describe(self, report: Report) -> None:
         status = self._localizer.status
-        report.add(_LEVELS[status.state], status.words)
+        report.add(WARN if status.degraded else _LEVELS[status.state], status.words)
         report.values['state'] = status.state.value
+        report.values['pose by'] = '' if status.cause is None else status.cause.value
         report.values['estimator'] = self._localizer.config.estimator
         report.values['without measurement [s]'] = f'{status.dead_reckoning_s:.2f}'
         estimate = self._localizer.estimate

@@ -6,6 +6,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 
+from tablerunner.estimation import SmootherConfig, TransformSmoother
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Estimate, Matrix, OdometrySample
 from tablerunner_ros.conversions.odometry import fill_odometry
@@ -40,6 +41,8 @@ class EstimateOutput:
             PoseWithCovarianceStamped, 'pose', qos_for('pose')
         )
         self._tf = TransformBroadcaster(node, map_frame, odom_frame) if publish_tf else None
+        self._smoother = TransformSmoother(SmootherConfig())
+        self._starts = 0
 
     def odometry(
         self, estimate: Estimate, velocity: tuple[float, float], twist_covariance: Matrix
@@ -65,7 +68,16 @@ class EstimateOutput:
         )
         self._pose_publisher.publish(self._pose)
 
-    def transform(self, stamp: int, map_to_odom: Pose2) -> None:
-        """Broadcast where odom lies in map."""
-        if self._tf is not None:
-            self._tf.send(stamp, map_to_odom)
+    def configure(self, config: SmootherConfig) -> None:
+        """Move map to odom more or less gently from now on."""
+        self._smoother.config = config
+
+    def transform(self, estimate: Estimate, map_to_odom: Pose2, starts: int) -> None:
+        """Broadcast where odom lies in map; another number of `starts` is another estimate."""
+        if self._tf is None:
+            return
+        if starts != self._starts:
+            self._starts = starts
+            self._smoother.reset()
+        shown = self._smoother.follow(estimate.stamp, map_to_odom, estimate.pose)
+        self._tf.send(estimate.stamp, shown)

@@ -11,160 +11,25 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
-from tf2_msgs.msg import TFMessage
+from sensor_msgs.msg import MagneticField
 
 from fusion_node.node import FusionNode
+from fusion_node.testing import ANCHORS, START, Fusion
 from tablerunner.errors import ConfigError
-from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
-from tablerunner.types import Anchor, OdometrySample, PoseSample, RangeSample
-from tablerunner_interfaces.msg import Innovation, UwbAnchorArray, UwbRange
+from tablerunner.types import MagneticSample, OdometrySample, PoseSample
+from tablerunner_interfaces.msg import UwbAnchorArray
 from tablerunner_ros.conversions.anchors import anchors_to_message
+from tablerunner_ros.conversions.imu import magnetic_to_message
 from tablerunner_ros.conversions.odometry import odometry_from_message, odometry_to_message
 from tablerunner_ros.conversions.pose import pose_from_message, pose_to_message
 from tablerunner_ros.conversions.quaternion import heading_from_quaternion
 from tablerunner_ros.conversions.stamp import stamp_from_message
-from tablerunner_ros.conversions.uwb_range import range_to_message
 from tablerunner_ros.testing.probe import Probe
 from tablerunner_ros.testing.process import Processes
 
-ANCHORS = tuple(
-    Anchor(name, place)
-    for name, place in {
-        'A0': (0.0, 0.0, 2.25),
-        'A1': (10.0, 0.0, 2.25),
-        'A2': (10.0, 10.0, 2.25),
-        'A3': (0.0, 10.0, 2.25),
-    }.items()
-)
-TAG_HEIGHT = 1.1
-START = Pose2(3.0, 4.0, 0.5)
 NAN = math.nan
-
-
-class Fusion:
-    """A fusion_node in this process, a robot that drives in the map, and the probe between."""
-
-    def __init__(self, probe: Probe, start: Pose2 | None = START, **parameters: Any) -> None:
-        self.probe = probe
-        given = {'tag_position': [0.0, 0.0, TAG_HEIGHT], **parameters}
-        if start is not None:
-            given['initial_pose'] = [start.x, start.y, start.heading]
-        self.node = probe.host(
-            FusionNode,
-            parameter_overrides=[
-                Parameter(name.replace('__', '.'), value=value) for name, value in given.items()
-            ],
-        )
-        self.filtered = probe.listen(Odometry, 'odometry/filtered')
-        self.poses = probe.listen(PoseWithCovarianceStamped, 'pose')
-        self.innovations = probe.listen(Innovation, 'innovations')
-        self.tf = probe.listen(TFMessage, 'tf')
-        probe.speak(Odometry, 'odom')
-        probe.speak(UwbRange, 'uwb/ranges')
-        probe.speak(UwbAnchorArray, 'uwb/anchors')
-        probe.speak(PoseWithCovarianceStamped, 'initialpose')
-        for topic in ('odom', 'uwb/anchors', 'initialpose'):
-            probe.connected(topic)
-        if given.get('use_ranges', True):
-            probe.connected('uwb/ranges')
-        for topic in ('odometry/filtered', 'pose', 'innovations'):
-            probe.heard(topic)
-        self.stamp = time.time_ns() - 300 * 10**9
-        self.truth = START  # base_link in map
-        self.odom = Pose2()  # base_link in odom
-        self.velocity = (0.0, 0.0)
-        self.count = 0
-        probe.publish('uwb/anchors', anchors_to_message(ANCHORS, self.stamp, 'map'))
-        self.taken('uwb/anchors', 1)
-
-    def taken(self, source: str, count: int) -> None:
-        """Wait until the node has used as many messages of a stream."""
-        self.probe.wait_diagnostic(
-            f'fusion_node: {source}', 'taken', lambda value: int(value) >= count
-        )
-
-    def refused(self, source: str, reason: str, count: int = 1) -> None:
-        """Wait until a refusal is on /diagnostics."""
-        self.probe.wait_diagnostic(f'fusion_node: {source}', f'refused: {reason}', str(count))
-
-    def send_odometry(self, **changes: Any) -> None:
-        """Publish the odometry of now."""
-        sample = OdometrySample(
-            changes.pop('stamp', self.stamp), self.odom, *self.velocity, np.eye(3) * 1e-4
-        )
-        message = odometry_to_message(sample, changes.pop('frame', 'odom'), 'base_link')
-        self.probe.publish('odom', message)
-
-    def send_range(self, anchor: Anchor, **changes: Any) -> None:
-        """Publish a range of now, true unless told otherwise."""
-        self.count += 1
-        sample = RangeSample(
-            stamp=changes.pop('stamp', self.stamp),
-            anchor_id=changes.pop('anchor_id', anchor.anchor_id),
-            tag_id='tag',
-            sequence=self.count,
-            range_m=changes.pop('range_m', self.distance(anchor)),
-            variance_m2=changes.pop('variance_m2', 0.01),
-        )
-        self.probe.publish('uwb/ranges', range_to_message(sample, 'uwb_tag'))
-
-    def distance(self, anchor: Anchor) -> float:
-        """Return the true distance between tag and anchor."""
-        return math.dist((self.truth.x, self.truth.y, TAG_HEIGHT), anchor.position)
-
-    def send_start(self, pose: Pose2, frame: str = 'map', stamp: int | None = None) -> None:
-        """Publish what a user clicks."""
-        covariance = np.diag([0.25, 0.25, 0.07])
-        sample = PoseSample(self.stamp if stamp is None else stamp, pose, covariance)
-        self.probe.publish('initialpose', pose_to_message(sample, frame))
-
-    def drive(self, speed: float, rate: float, steps: int, ranges: bool = True) -> None:
-        """Drive for steps of 20 ms, one range (of the anchors in turn) at every second step."""
-        self.velocity = (speed, rate)
-        step = Pose2(speed * 0.02, 0.0, rate * 0.02)
-        for index in range(steps):
-            self.stamp += 20_000_000
-            self.truth, self.odom = self.truth @ step, self.odom @ step
-            self.send_odometry()
-            # Odometry and ranges are two topics, and have no order between them.
-            self.probe.spin(0.002)
-            if ranges and index % 2 == 0:
-                self.send_range(ANCHORS[index // 2 % len(ANCHORS)])
-                self.probe.spin(0.002)
-
-    def settled(self) -> Odometry:
-        """Wait until the estimate has reached the stamp of now, and return it."""
-        return self.probe.wait_for(
-            lambda: next(
-                (
-                    message
-                    for message in reversed(self.filtered)
-                    if stamp_from_message(message.header.stamp) == self.stamp
-                ),
-                None,
-            ),
-            'an estimate of now',
-        )
-
-    def error(self) -> tuple[float, float]:
-        """Return the error of the estimate of now: position [m], heading [rad]."""
-        pose = self.settled().pose.pose
-        heading = heading_from_quaternion(pose.orientation)
-        return (
-            math.hypot(pose.position.x - self.truth.x, pose.position.y - self.truth.y),
-            abs(difference(heading, self.truth.heading)),
-        )
-
-
-@pytest.fixture
-def fusion(probe: Probe) -> Fusion:
-    item = Fusion(probe)
-    item.send_odometry()
-    item.settled()
-    return item
 
 
 def test_fusion_of_odometry_and_ranges_is_where_the_robot_is(fusion: Fusion) -> None:
@@ -268,13 +133,22 @@ def test_fusion_unknown_start_is_not_confident_before_it_is_known(probe: Probe) 
 def test_fusion_bad_range_is_refused_and_counted(
     fusion: Fusion, spoil: Callable[[Fusion], None], reason: str
 ) -> None:
-    """The estimate stays, the reason stands on /diagnostics, and good ranges go on."""
+    """The estimate stays, the reason stands on /diagnostics, and good ranges go on.
+
+    The refusal is on innovations too, with the anchor and without any number.
+    """
     fusion.drive(0.5, 0.2, 20)
+    fusion.probe.wait_for(lambda: len(fusion.innovations) == 10, 'the good ones before it')
     spoil(fusion)
     fusion.refused('uwb/ranges', reason)
-    fusion.probe.wait_for(lambda: len(fusion.innovations) == 10, 'the good ones before it')
+    last = fusion.probe.wait_for(lambda: fusion.innovations[10:], 'its innovation')[0]
+    assert f'{last.reason} ({last.key})' == reason
+    assert (last.source, last.accepted) == ('uwb/ranges', False)
+    assert (len(last.innovation), len(last.variance)) == (0, 0)
+    assert math.isnan(last.nis)
     fusion.drive(0.5, 0.2, 10)
-    fusion.probe.wait_for(lambda: len(fusion.innovations) == 15, 'further ranges')
+    fusion.probe.wait_for(lambda: len(fusion.innovations) == 16, 'further ranges')
+    assert all(item.accepted for item in fusion.innovations[11:])
     assert fusion.error()[0] < 0.05
 
 
@@ -393,7 +267,7 @@ def test_fusion_parameter_changed_while_it_runs(fusion: Fusion) -> None:
     assert fusion.innovations[-1].gate == 1e-12
     assert not fusion.innovations[-1].accepted
     assert 'filter.gate: got 0.0' in probe.set_parameter('fusion_node', 'filter.gate', 0.0)
-    assert 'read-only' in probe.set_parameter('fusion_node', 'estimator', 'dead_reckoning')
+    assert 'read-only' in probe.set_parameter('fusion_node', 'history', 2.0)
 
 
 @pytest.mark.parametrize(
@@ -412,6 +286,25 @@ def test_fusion_bad_parameter_is_named(
     given = [Parameter(name, value=value) for name, value in parameters.items()]
     with pytest.raises(ConfigError, match=re.escape(f'parameters of /fusion_node: {words}')):
         FusionNode(context=probe.context, parameter_overrides=given)
+
+
+def test_fusion_compass_is_heard_where_the_field_is_the_earths(probe: Probe) -> None:
+    """A heading from imu/mag narrows the estimate's; a field bent by iron is refused by name."""
+    robot = Fusion(probe, compass__use=True, compass__north=0.5, initial_pose_std=[0.1, 0.1, 0.3])
+    probe.speak(MagneticField, 'imu/mag')
+    probe.connected('imu/mag')
+    robot.drive(0.5, 0.0, 3)
+    probe.wait_for(lambda: robot.poses, 'a pose')
+    for horizontal, reason in ((20e-6, ''), (40e-6, 'field not plausible')):
+        told = len(robot.innovations)
+        angle = 0.5 - START.heading
+        field = (horizontal * math.cos(angle), horizontal * math.sin(angle), -44e-6)
+        sample = MagneticSample(robot.stamp, *field)
+        probe.publish('imu/mag', magnetic_to_message(sample, 'imu_link'))
+        probe.wait_for(lambda told=told: len(robot.innovations) > told, 'an innovation')
+        last = robot.innovations[-1]
+        assert (last.source, last.accepted, last.reason) == ('imu/mag', not reason, reason)
+    assert robot.poses[-1].pose.covariance[35] < 0.012  # 0.09 before, the heading's 0.01 beside it
 
 
 def test_fusion_bad_parameter_file_exits_2_with_one_sentence(processes: Processes) -> None:

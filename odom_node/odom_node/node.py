@@ -71,6 +71,11 @@ class OdomNode(Node):
             self._diagnostics.refuse(
                 Refusal(result.stamp, IMU, '', 'imu silent: heading from the wheels')
             )
+        if self._odometer.slipping:
+            # Used all the same, with a doubt that its covariance carries on.
+            self._diagnostics.refuse(
+                Refusal(result.stamp, WHEELS, '', 'wheels slip: distance doubted'), expected=True
+            )
 
     def _on_imu(self, message: Imu) -> None:
         sample = imu_from_message(message, self._config.imu_heading)
@@ -92,6 +97,9 @@ class OdomNode(Node):
     def _describe(self, report: Report) -> None:
         report.values['heading source'] = self._odometer.config.heading_source
         report.values['gyro bias [rad/s]'] = f'{self._odometer.gyro_bias:.6f}'
+        report.values['slips'] = str(self._odometer.slips)
+        delay, deviation = self._odometer.imu_delay
+        report.values['delay of IMU stamps [s]'] = f'{delay:.4f} +- {deviation:.4f}'
 
 
 def main() -> int:

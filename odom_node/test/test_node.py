@@ -215,6 +215,20 @@ def test_odom_silent_imu_leaves_the_heading_to_the_wheels_and_says_so(wheels: Wh
     wheels.refused('imu silent: heading from the wheels', 'imu/data')
 
 
+def test_odom_wheel_that_slips_is_counted_and_its_distance_doubted(wheels: Wheels) -> None:
+    """One wheel turns twice as far as the gyroscope can agree with, for a quarter of a second."""
+    calm = wheels.drive(0.5, 0.0, steps=20)
+    for _ in range(12):
+        wheels.stamp += 20_000_000
+        wheels.left += 0.5 * 0.02 / RADIUS
+        wheels.right += 1.0 * 0.02 / RADIUS
+        wheels.imu(0.0)
+        wheels.send()
+    slipped = wheels.expect(33)
+    assert slipped.twist.covariance[0] > 10 * calm.twist.covariance[0]
+    wheels.refused('wheels slip: distance doubted')
+
+
 def test_odom_stream_that_begins_again_is_taken_up_and_reported(wheels: Wheels) -> None:
     """A bag that starts anew, with encoders that start anew."""
     wheels.drive(0.5, 0.0, 10)

@@ -74,6 +74,10 @@ class CovarianceError(TablerunnerError):
     """A covariance is not symmetric, not finite or not positive semi-definite."""
 
 
+class TuningError(TablerunnerError):
+    """What was recorded is too little to find noise from."""
+
+
 class BagError(TablerunnerError):
     """A recording cannot be read or lacks what was asked of it."""
 

@@ -22,7 +22,7 @@ from nav_controller.params import NavNodeConfig, SafetyNodeConfig
 from odom_node.params import OdomNodeConfig
 from sim_bridge.params import BridgeConfig
 from tablerunner.config import Config, Parameter, parameters_of
-from tablerunner.estimation import LocalizerConfig
+from tablerunner.estimation import LocalizerConfig, SmootherConfig
 from tablerunner.odometry import OdometerConfig
 from tablerunner.uwb import AnchorHealthConfig, PositionerConfig, RangerConfig
 from tablerunner_ros.stamps import StampConfig
@@ -37,7 +37,7 @@ CONFIGS: dict[str, tuple[type[Config], ...]] = {
         AnchorHealthConfig,
     ),
     'odom_node': (OdomNodeConfig, StampConfig, OdometerConfig),
-    'fusion_node': (FusionNodeConfig, StampConfig, LocalizerConfig),
+    'fusion_node': (FusionNodeConfig, StampConfig, SmootherConfig, LocalizerConfig),
     'nav_controller': (NavNodeConfig,),
     'safety_stop': (SafetyNodeConfig,),
     'sim_bridge': (BridgeConfig,),

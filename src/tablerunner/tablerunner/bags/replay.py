@@ -15,9 +15,11 @@ from tablerunner.bags.storage import Damage
 from tablerunner.bags.streams import Names, bag_records, converters, full_name
 from tablerunner.errors import BagError
 from tablerunner.estimation import Localizer, LocalizerState, Outcome
+from tablerunner.estimation.recording import RecordingLocalizer, Run
 from tablerunner.evaluation.consistency import SourceSummary, summarize_innovations
 from tablerunner.evaluation.errors import ErrorSeries, compare
 from tablerunner.evaluation.truth import Stamps, Truth
+from tablerunner.messages.imu import MAGNETIC_SOURCE
 from tablerunner.messages.truth import TruePose
 from tablerunner.odometry import Odometer
 from tablerunner.types import (
@@ -26,6 +28,7 @@ from tablerunner.types import (
     ExchangeSample,
     ImuSample,
     Innovation,
+    MagneticSample,
     Matrix,
     OdometrySample,
     PoseSample,
@@ -108,6 +111,8 @@ class ReplayResult:
         Times of reception of the first and last message of the bag [ns].
     damage : tuple of Damage
         What of the bag could not be read.
+    runs : tuple of Run
+        Every step of the estimator; empty unless asked for.
     """
 
     estimator: str
@@ -126,6 +131,7 @@ class ReplayResult:
     start: int
     end: int
     damage: tuple[Damage, ...] = ()
+    runs: tuple[Run, ...] = ()
 
     @property
     def data_s(self) -> float:
@@ -209,7 +215,8 @@ class _Replay:
         self._odometer = Odometer(self._config.odometer)
         self._ranger = Ranger(self._config.ranger)
         self._positioner = Positioner(self._config.positioner, anchors)
-        self._localizer = Localizer(self._config.localizer)
+        localizer = RecordingLocalizer if config.keep else Localizer
+        self._localizer = localizer(self._config.localizer)
         self._localizer.set_anchors(anchors)
         self._initialised: int | None = None
         self._first_stamp = 0
@@ -220,6 +227,7 @@ class _Replay:
             'uwb/exchanges': self._take_exchange,
             'uwb/ranges': self._take_range,
             'camera/pose': self._take_pose,
+            MAGNETIC_SOURCE: self._take_magnetic,
             'initialpose': self._take_initial_pose,
         }
 
@@ -237,6 +245,8 @@ class _Replay:
                 'to replay'
             )
         topics.append(ranges if present(ranges) else 'uwb/ranges')
+        if self._config.localizer.compass.use:
+            topics.append(MAGNETIC_SOURCE)
         topics += ['camera/pose', 'initialpose', TRUTH]
         return tuple(topic for topic in topics if present(topic))
 
@@ -293,6 +303,9 @@ class _Replay:
 
     def _take_pose(self, sample: PoseSample) -> None:
         self._note(self._localizer.add_pose(sample))
+
+    def _take_magnetic(self, sample: MagneticSample) -> None:
+        self._note(self._localizer.add_magnetic(sample))
 
     def _take_initial_pose(self, sample: PoseSample) -> None:
         self._note(self._localizer.set_pose(sample))
@@ -351,4 +364,5 @@ class _Replay:
             self._bag.start,
             self._bag.end,
             self._bag.damage,
+            self._localizer.runs() if isinstance(self._localizer, RecordingLocalizer) else (),
         )

@@ -42,6 +42,9 @@ class ReplayConfig(Config):
         high=60.0,
     )
     fixes: bool = parameter(False, description='Whether UWB-only fixes are computed too')
+    keep: bool = parameter(
+        False, description='Whether every step of the estimator is kept, as smoothing needs it'
+    )
 
     @classmethod
     def from_scenario(cls, scenario: Scenario) -> ReplayConfig:

@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from tablerunner.cli.calibrate import calibrate_app
+from tablerunner.cli.compare import compare
 from tablerunner.cli.convert import convert_app
 from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
 from tablerunner.cli.explain_rule import explain_rule
@@ -17,6 +18,7 @@ from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
 from tablerunner.cli.reproduce import reproduce
+from tablerunner.cli.tune import tune
 from tablerunner.errors import BagError, ConfigError, TablerunnerError
 
 GROUP = 'tablerunner.commands'
@@ -37,7 +39,9 @@ def make_app() -> typer.Typer:
     app.command()(replay)
     app.command()(info)
     app.command()(plot)
+    app.command()(tune)
     app.command()(reproduce)
+    app.command()(compare)
     app.command()(explain_rule)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')

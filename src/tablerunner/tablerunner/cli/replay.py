@@ -2,14 +2,16 @@
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
 from tablerunner.cli.exits import FAILED
 
 if TYPE_CHECKING:
-    from tablerunner.bags.replay import ReplayResult
+    from tablerunner.bags.replay_config import ReplayConfig
+    from tablerunner.cli.console import Progress
+    from tablerunner.cli.replay_report import Replayed
 
 
 def replay(
@@ -17,7 +19,12 @@ def replay(
         Path, typer.Argument(metavar='BAG', help='Bag folder, an .mcap or a .db3 file.')
     ],
     estimator: Annotated[
-        str, typer.Option(metavar='E', help='Name of the estimator, e.g. ekf, dead_reckoning.')
+        str,
+        typer.Option(
+            metavar='E',
+            help='Name of the estimator, e.g. ekf, dead_reckoning; several with commas, or all, '
+            'for a table.',
+        ),
     ] = 'ekf',
     scenario: Annotated[
         Optional[Path],
@@ -36,101 +43,82 @@ def replay(
         typer.Option(metavar='X,Y,YAW', help='Pose at the start; found by driving if not given.'),
     ] = '',
     namespace: Annotated[str, typer.Option(help='Namespace of the robot in the bag.')] = '',
+    smooth: Annotated[
+        bool,
+        typer.Option('--smooth', help='Smooth the path too: what all the data say of each time.'),
+    ] = False,
+    from_s: Annotated[
+        float,
+        typer.Option(
+            '--from', metavar='SECONDS', min=0.0, help='Give errors from this time on as well.'
+        ),
+    ] = 0.0,
 ) -> None:
     """Run a bag through the estimation code of the nodes: same bag, same result, bit for bit.
 
     Errors are against /ground_truth, where the bag has it, from the moment the estimator declares
-    itself initialised. Exit code 1: it never did.
+    itself initialised; those of the smoothed path from the first odometry on. Exit code 1: the
+    estimator (with several: one of them) never found its start.
 
     Example: tablerunner replay out/demo/bag --json out/replay.json
     """
     from dataclasses import replace as changed
 
-    from tablerunner.bags.reader import BagReader
-    from tablerunner.bags.replay import replay as run
     from tablerunner.cli.console import Progress
     from tablerunner.cli.json_file import write_json
-    from tablerunner.cli.replay_options import find_scenario, replay_config
+    from tablerunner.cli.replay_options import estimator_names, find_scenario, replay_config
+    from tablerunner.cli.replay_report import table
+    from tablerunner.errors import ConfigError
+    from tablerunner.estimation.smoother import SMOOTHED
 
+    names = estimator_names(estimator)
+    if plot_file is not None and len(names) > 1:
+        raise ConfigError('--plot', ', '.join(names), 'one estimator', 'options')
+    if smooth and not set(names) & set(SMOOTHED):
+        expected = 'one of ' + ', '.join(SMOOTHED) + ' as estimator'
+        raise ConfigError('--smooth', ', '.join(names), expected, 'options')
     room = find_scenario(bag, scenario)
-    config = changed(replay_config(room, estimator, start, namespace), fixes=plot_file is not None)
+    items = []
     with Progress() as progress:
-        progress.show(f'replaying {bag}')
-        begun = time.perf_counter()
-        with BagReader(bag) as reader:
-            result = run(reader, config)
-        took = time.perf_counter() - begun
-        for item in result.damage:
+        for name in names:
+            config = changed(
+                replay_config(room, name, start, namespace),
+                fixes=plot_file is not None,
+                keep=smooth and name in SMOOTHED,
+            )
+            items.append(_replayed(bag, config, from_s, progress))
+        for item in items[0].result.damage:
             progress.say(f'damaged: {item}', 'yellow')
-    for line in report(result, bag, took):
+    for line in items[0].lines() if len(items) == 1 else table(items):
         typer.echo(line)
     if json_file is not None:
-        write_json(json_file, figures(result, bag, took))
+        figures = [item.figures() for item in items]
+        write_json(json_file, figures[0] if len(figures) == 1 else figures)
     if plot_file is not None:
         from tablerunner.bags.trips import trip_of_replay
         from tablerunner.evaluation.plots import draw_trip
 
-        draw_trip(trip_of_replay(result, f'Replay of {bag.name}'), room, plot_file)
+        draw_trip(trip_of_replay(items[0].result, f'Replay of {bag.name}'), room, plot_file)
         typer.echo(f'picture        {plot_file}')
-    if result.initialised is None:
+    if any(item.result.initialised is None for item in items):
         raise typer.Exit(FAILED)
 
 
-def figures(result: 'ReplayResult', bag: Path, took_s: float) -> dict[str, Any]:
-    """Return what ``--json`` writes; lengths in m, times in s."""
-    summary = result.errors.summary()
-    sources = result.by_source()
-    return {
-        'bag': str(bag),
-        'estimator': result.estimator,
-        'state': result.state.value,
-        'initialised_after': _initialised_after(result),
-        'rmse': summary.rmse,
-        'mean': summary.mean,
-        'max': summary.max,
-        'final': summary.final,
-        'heading_rmse': summary.heading_rmse,
-        'compared': summary.count,
-        'accepted': {name: item.accepted for name, item in sources.items()},
-        'nis': {name: item.nis.mean for name, item in sources.items()},
-        'measurements': {name: item.count for name, item in sources.items()},
-        'refused': {
-            f'{source}: {reason}': count for (source, reason), count in result.refusals.items()
-        },
-        'damage': [str(item) for item in result.damage],
-        'data_seconds': result.data_s,
-        'seconds': took_s,
-    }
+def _replayed(
+    bag: Path, config: 'ReplayConfig', from_s: float, progress: 'Progress'
+) -> 'Replayed':
+    from tablerunner.bags.reader import BagReader
+    from tablerunner.bags.replay import replay as run
+    from tablerunner.bags.smoothing import smoothed_errors
+    from tablerunner.cli.replay_report import Replayed
 
-
-def report(result: 'ReplayResult', bag: Path, took_s: float) -> list[str]:
-    """Return the lines for people."""
-    inputs = [topic for topic in result.sources if topic != 'ground_truth']
-    lines = [f'bag            {bag}: {result.data_s:.1f} s of ' + ', '.join(inputs)]
-    after = _initialised_after(result)
-    words = 'never initialised' if after is None else f'initialised after {after:.1f} s'
-    lines.append(f'estimator      {result.estimator}, {words}, {result.state.value} at the end')
-    summary = result.errors.summary()
-    if summary.count:
-        lines.append(
-            f'position error rmse {summary.rmse:.3f} m, mean {summary.mean:.3f} m, '
-            f'max {summary.max:.3f} m, final {summary.final:.3f} m'
-        )
-    else:
-        lines.append('position error unknown: no truth at the times of the estimates')
-    for source, item in result.by_source().items():
-        lines.append(
-            f'{source:<14} {100 * item.accepted:.1f} % of {item.count} accepted, '
-            f'mean NIS {item.nis.mean:.2f}'
-        )
-    for (source, reason), count in result.refusals.items():
-        lines.append(f'{source:<14} {count} refused: {reason}')
-    lines.append(f'took           {took_s:.2f} s, {result.data_s / took_s:.0f} times real time')
-    return lines
-
-
-def _initialised_after(result: 'ReplayResult') -> float | None:
-    if result.initialised is None:
-        return None
-    first = int(result.first_stamp)
-    return (result.initialised - first) * 1e-9
+    progress.show(f'replaying {bag}: {config.localizer.estimator}')
+    begun = time.perf_counter()
+    with BagReader(bag) as reader:
+        result = run(reader, config)
+    took = time.perf_counter() - begun
+    smoothed = None
+    if config.keep:
+        progress.show(f'smoothing {bag}: {config.localizer.estimator}')
+        smoothed = smoothed_errors(result)
+    return Replayed(result, bag, took, from_s, smoothed)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tablerunner.bags.replay_config import ReplayConfig
 from tablerunner.errors import ConfigError
+from tablerunner.estimation import ESTIMATORS
 from tablerunner.scenario import Scenario, load_scenario
 
 SCENARIO_FILE = 'scenario.yaml'
@@ -59,3 +60,15 @@ def parse_start(text: str) -> tuple[float, ...]:
     if len(numbers) != 3 or not all(math.isfinite(number) for number in numbers):
         raise ConfigError('--start', text, 'X,Y,YAW: three numbers in m, m and rad')
     return numbers
+
+
+def estimator_names(text: str) -> tuple[str, ...]:
+    """Return the estimators that an option names: one, several with commas, or ``all``."""
+    if text.strip() == 'all':
+        return tuple(ESTIMATORS)
+    names = tuple(dict.fromkeys(part.strip() for part in text.split(',')))
+    for name in names:
+        if name not in ESTIMATORS:
+            expected = 'one of ' + ', '.join([*ESTIMATORS, 'all'])
+            raise ConfigError('estimator', name, expected, 'options')
+    return names

@@ -4,10 +4,12 @@ from tablerunner.estimation.estimator import Estimator, EstimatorConfig, Start
 from tablerunner.estimation.localizer import Localizer, Outcome
 from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.registry import ESTIMATORS
-from tablerunner.estimation.status import LocalizerState, LocalizerStatus
+from tablerunner.estimation.status import Cause, LocalizerState, LocalizerStatus
+from tablerunner.estimation.transform_smoother import SmootherConfig, TransformSmoother
 
 __all__ = [
     'ESTIMATORS',
+    'Cause',
     'Estimator',
     'EstimatorConfig',
     'Localizer',
@@ -15,5 +17,7 @@ __all__ = [
     'LocalizerState',
     'LocalizerStatus',
     'Outcome',
+    'SmootherConfig',
     'Start',
+    'TransformSmoother',
 ]

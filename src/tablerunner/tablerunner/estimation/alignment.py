@@ -11,7 +11,7 @@ pose explains the window nearly as well.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -116,12 +116,15 @@ class Alignment:
         Whether heading and position are good enough to start from.
     words : str
         What is still missing, for people; empty when certain.
+    contradicted : bool
+        Whether no pose explains ranges and odometry together.
     """
 
     mean: Vector
     covariance: Matrix
     certain: bool
     words: str
+    contradicted: bool = False
 
 
 def align(window: Window, bias_prior: Matrix, config: AlignmentConfig) -> Alignment | None:
@@ -155,11 +158,22 @@ def align(window: Window, bias_prior: Matrix, config: AlignmentConfig) -> Alignm
     words = _missing(covariance, lead, config)
     if not words and window.driven < config.min_driven:
         words = 'heading not certain yet: drive on'
-    if scale > config.max_scatter**2:
+    contradicted = scale > config.max_scatter**2
+    if contradicted:
         words = 'ranges and odometry contradict each other'
+    elif not words:
+        standing = _cost_of_standing(window, prior)
+        if standing - float(cost[best]) < config.ambiguity * max(1.0, scale):
+            words = 'ranges do not show the way that odometry tells: drive on'
     if covariance[2, 2] > 0.5 * UNKNOWN_YAW_VARIANCE or lead < config.ambiguity:
         covariance = _without_heading(covariance, mean, cost, int(best), max(1.0, scale))
-    return Alignment(mean[best], covariance, not words, words)
+    return Alignment(mean[best], covariance, not words, words, contradicted)
+
+
+def _cost_of_standing(window: Window, prior: Matrix) -> float:
+    """Return how well a robot fits that stood all the while: its wheels may have spun."""
+    still = replace(window, tags=np.broadcast_to(window.tags[-1], window.tags.shape))
+    return float(_minimise(still, prior)[1].min())
 
 
 def _missing(covariance: Matrix, lead: float, config: AlignmentConfig) -> str:

@@ -1,9 +1,10 @@
 """The default estimator: an extended Kalman filter on ranges with self-calibration.
 
 State: x, y, heading, scale errors of distances and turns, bias of the yaw rate, delay of the
-ranges' stamps, range bias of each anchor (`models.state`). The range biases start with one common
-part and one of each anchor's own, so that the filter learns both from what the geometry shows and
-holds what it does not: an unobservable combination simply keeps its prior covariance.
+ranges' stamps, range bias and range scale of each anchor (`models.state`). The range biases start
+with one common part and one of each anchor's own, so that the filter learns both from what the
+geometry shows and holds what it does not: an unobservable combination simply keeps its prior
+covariance.
 
 What blocks the way makes a range longer, never shorter. So
 
@@ -36,7 +37,12 @@ from tablerunner.estimation.estimator import (
 )
 from tablerunner.estimation.models.motion_model import input_noise, move, transport
 from tablerunner.estimation.models.position_model import predict_position
-from tablerunner.estimation.models.range_model import STANDING, Point3, predict_range
+from tablerunner.estimation.models.range_model import (
+    STANDING,
+    Point3,
+    predict_range,
+    predict_ranges,
+)
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
     HEADING,
@@ -64,7 +70,7 @@ from tablerunner.types import (
 LONG, SHORT = 'long for a while', 'short for a while'
 """Why a range was taken as it was: its anchor's mean innovation is no chance."""
 
-_CLIP = 4.0
+CLIP = 4.0
 """One wild reading does not make an anchor's mean [standard deviations]."""
 
 
@@ -105,13 +111,15 @@ class Ekf:
         self.lever_arm = lever_arm
         self.state_names = state_names(tuple(anchor.anchor_id for anchor in anchors))
         self._anchors = {anchor.anchor_id: (i, anchor) for i, anchor in enumerate(anchors)}
-        self._size = RANGE_BIAS + len(anchors)
+        self._size = RANGE_BIAS + 2 * len(anchors)
+        self._biases = slice(RANGE_BIAS, RANGE_BIAS + len(anchors))
+        self._scales = slice(RANGE_BIAS + len(anchors), self._size)
         self._calm = (0.0,) * len(anchors)
         self._usual_bias = math.hypot(config.range_bias_common_std, config.range_bias_std)
         walk = np.zeros(self._size)
         walk[GYRO_BIAS] = config.gyro_bias_walk**2
         walk[RANGE_DELAY] = config.range_delay_walk**2
-        walk[RANGE_BIAS:] = config.range_bias_walk**2
+        walk[self._biases] = config.range_bias_walk**2
         self._walk = np.diag(walk)  # for each second
 
     def start(self, start: Start) -> Estimate:
@@ -135,12 +143,13 @@ class Ekf:
         ):
             covariance[index, index] = deviation**2
         if start.range_biases is not None and start.covariance is not None:
-            mean[RANGE_BIAS:] = start.range_biases
+            mean[self._biases] = start.range_biases
             rows = np.r_[0:3, RANGE_BIAS : RANGE_BIAS + count]
             covariance[np.ix_(rows, rows)] = start.covariance
         else:
             covariance[:3, :3] = start.pose_covariance
-            covariance[RANGE_BIAS:, RANGE_BIAS:] = bias_covariance(config, count)
+            covariance[self._biases, self._biases] = bias_covariance(config, count)
+        covariance[self._scales, self._scales] = np.eye(count) * config.range_scale_std**2
         _require_covariance(covariance)
         return Estimate(start.stamp, mean, covariance, memory=self._calm)
 
@@ -208,16 +217,18 @@ class Ekf:
     ) -> tuple[Estimate, tuple[Innovation, ...]] | None:
         """Return what `update_ranges` does if no range is out of the ordinary, else None."""
         config, memory = self.config, list(estimate.memory)
-        slopes = np.empty((len(samples), self._size))
-        innovations = []
-        noises = []
-        for row, sample in enumerate(samples):
-            index, anchor = self._anchors[sample.anchor_id]
-            expected, slopes[row] = predict_range(
-                estimate.mean, anchor.position, self.lever_arm, index, estimate.twist
-            )
-            innovations.append(sample.range_m - anchor.bias_m - expected)
-            noises.append(range_variance(config, sample))
+        anchors = [self._anchors[sample.anchor_id] for sample in samples]
+        expected, slopes = predict_ranges(
+            estimate.mean,
+            [(anchor.position, index) for index, anchor in anchors],
+            self.lever_arm,
+            estimate.twist,
+        )
+        innovations = [
+            sample.range_m - anchor.bias_m - value
+            for sample, (_, anchor), value in zip(samples, anchors, expected, strict=True)
+        ]
+        noises = [range_variance(config, sample) for sample in samples]
         cross = estimate.covariance.dot(slopes.T)
         spread = slopes.dot(cross)
         spread.reshape(-1)[:: len(samples) + 1] += noises
@@ -235,9 +246,9 @@ class Ekf:
         variances = (scales * scales).reshape(-1, 1)
         found = []
         for row, (sample, deviation) in enumerate(zip(samples, deviations, strict=True)):
-            index = self._anchors[sample.anchor_id][0]
+            index = anchors[row][0]
             persistent = memory[index]
-            if persistent > config.persistence:
+            if not -config.doubt < persistent < config.persistence:
                 return None
             memory[index] = persistent + config.persistence_share * (deviation - persistent)
             found.append(
@@ -278,7 +289,7 @@ class Ekf:
             # What has been learned of this anchor was something in the way, which is gone.
             estimate = self._forget_bias(estimate, index)
             return self._update_range(estimate, sample)
-        clipped = min(max(deviations, -_CLIP), _CLIP)
+        clipped = min(max(deviations, -CLIP), CLIP)
         memory[index] = persistent = persistent + config.persistence_share * (clipped - persistent)
         nis = deviations * deviations
         accepted, reason = nis <= config.gate, ''

@@ -9,34 +9,100 @@ is never corrected. Ranges are corrections of one row each, in Joseph's form (32
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from tablerunner.estimation.correction import correct, expect
+from tablerunner.estimation.correction import correct, correct_by_one, correct_state, expect
 from tablerunner.estimation.estimator import (
     RANGE_SOURCE,
     EstimatorConfig,
     Measurement,
     RangeByRange,
     Start,
+    SunConfig,
     no_use,
 )
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.geometry.angles import wrap
+from tablerunner.odometry.batch import Motions
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import (
     Anchor,
     Estimate,
     HeadingSample,
     Innovation,
+    Matrix,
     RangeSample,
     Vector,
 )
 
+X, Y, HEADING, VX, VY = range(5)
 _SIZE = 5
 _STILL_M_S = 1.0  # deviation of each velocity at the start: any speed of a robot indoors
 _NEAREST_M = 1e-6
+
+
+def predict_moving(
+    config: SunConfig,
+    mean: Matrix,
+    covariance: Matrix,
+    motion: Motion | Motions,
+    turn_variance: float | Vector,
+) -> tuple[Matrix, Matrix]:
+    """Return means and covariances after a step (Sun 44, 45), the velocity measured (42).
+
+    Parameters
+    ----------
+    config : SunConfig
+    mean : ndarray, shape (..., 5)
+    covariance : ndarray, shape (..., 5, 5)
+    motion : Motion or Motions
+        Odometry over the step. A step of no time changes nothing.
+    turn_variance : float or ndarray, shape (...)
+        Of the turn [rad^2].
+    """
+    dt = np.asarray(motion.dt_s)
+    direction = mean[..., HEADING] + 0.5 * motion.turn_rad
+    moved, spread = mean.copy(order='K'), covariance.copy(order='K')
+    moved[..., X : Y + 1] += dt[..., None] * mean[..., VX:]
+    moved[..., HEADING] = wrap(np.asarray(mean[..., HEADING] + motion.turn_rad))
+    spread[..., X : Y + 1, :] += dt[..., None, None] * spread[..., VX:, :]
+    spread[..., :, X : Y + 1] += dt[..., None, None] * spread[..., :, VX:]
+    # White acceleration of density q: the exact integral over the step.
+    density = config.acceleration_density
+    for place, velocity in ((X, VX), (Y, VY)):
+        spread[..., place, place] += density * dt**3 / 3.0
+        spread[..., place, velocity] += density * dt**2 / 2.0
+        spread[..., velocity, place] += density * dt**2 / 2.0
+        spread[..., velocity, velocity] += density * dt
+    spread[..., HEADING, HEADING] += turn_variance
+    lasts = dt > 0.0
+    time = np.where(lasts, dt, 1.0)
+    speed = motion.distance_m / time
+    # Weighed by the time it stands for: ten readings a second tell as much as fifty. Noise of
+    # both axes is independent, so that one can be taken after the other.
+    for velocity, told in ((VX, speed * np.cos(direction)), (VY, speed * np.sin(direction))):
+        innovation = np.asarray(told - moved[..., velocity])
+        moved, spread, _ = correct_state(
+            moved, spread, innovation, velocity, config.velocity_variance / time, lasts
+        )
+    return moved, spread
+
+
+def expect_distance(mean: Matrix, anchor: Point3, lever_arm: Point3) -> tuple[Vector, Matrix]:
+    """Return distances to an anchor (Sun 38), shape (...) [m], and their slopes, (..., 5)."""
+    cos, sin = np.cos(mean[..., HEADING]), np.sin(mean[..., HEADING])
+    dx = mean[..., X] + cos * lever_arm[0] - sin * lever_arm[1] - anchor[0]
+    dy = mean[..., Y] + sin * lever_arm[0] + cos * lever_arm[1] - anchor[1]
+    distance = np.sqrt(dx * dx + dy * dy + (lever_arm[2] - anchor[2]) ** 2)
+    slope = np.zeros_like(mean)
+    far = distance > _NEAREST_M
+    safe = np.where(far, distance, 1.0)
+    slope[..., X] = np.where(far, dx / safe, 0.0)
+    slope[..., Y] = np.where(far, dy / safe, 0.0)
+    return distance, slope
 
 
 class EkfCv(RangeByRange):
@@ -63,59 +129,58 @@ class EkfCv(RangeByRange):
 
     def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
         """Return the estimate carried to `stamp` (Sun 44, 45), its velocity measured (42)."""
-        dt = motion.dt_s
-        if dt <= 0.0:
-            return Estimate(stamp, estimate.mean, estimate.covariance)
-        direction = float(estimate.mean[2]) + 0.5 * motion.turn_rad
-        carry = np.eye(_SIZE)
-        carry[0, 3] = carry[1, 4] = dt
-        mean = carry @ estimate.mean
-        mean[2] = wrap(float(estimate.mean[2]) + motion.turn_rad)
+        if motion.dt_s <= 0.0:
+            return replace(estimate, stamp=stamp)
         _, turned = self.config.motion.variances(motion)
-        # White acceleration of density q: the exact integral over the step.
-        density = self.config.sun.acceleration_density
-        noise = np.zeros((_SIZE, _SIZE))
-        noise[0, 0] = noise[1, 1] = density * dt**3 / 3.0
-        noise[0, 3] = noise[3, 0] = noise[1, 4] = noise[4, 1] = density * dt**2 / 2.0
-        noise[3, 3] = noise[4, 4] = density * dt
-        noise[2, 2] = turned
-        moved = Estimate(stamp, mean, carry @ estimate.covariance @ carry.T + noise)
-        speed = motion.distance_m / dt
-        told = speed * np.array([math.cos(direction), math.sin(direction)])
-        slope = np.zeros((2, _SIZE))
-        slope[0, 3] = slope[1, 4] = 1.0
-        # Weighed by the time it stands for: ten readings a second tell as much as fifty.
-        variance = self.config.sun.velocity_variance / dt
-        seen = expect(moved.covariance, told - mean[3:5], slope, np.eye(2) * variance)
-        return correct(moved, seen, stamp)
+        mean, covariance = predict_moving(
+            self.config.sun, estimate.mean, estimate.covariance, motion, turned
+        )
+        return replace(estimate, stamp=stamp, mean=mean, covariance=covariance)
 
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a range or a position (Sun 46, 47, 32)."""
         if isinstance(measurement, HeadingSample):
             return no_use(estimate, measurement, "the heading is odometry's")
         if isinstance(measurement, RangeSample):
-            anchor = self._anchors[measurement.anchor_id]
-            distance, slope = self._distance(estimate.mean, anchor)
-            innovation = np.array([measurement.range_m - anchor.bias_m - distance])
-            noise = np.array([[self.config.sun.range_variance]])
-            source, key = RANGE_SOURCE, measurement.anchor_id
-        else:
-            place, slope = predict_position(estimate.mean, measurement.point)
-            slope[:, 2] = 0.0  # the heading is odometry's
-            innovation = np.array([measurement.pose.x, measurement.pose.y]) - place
-            noise = measurement.covariance[:2, :2]
-            source, key = measurement.source, ''
-        seen = expect(estimate.covariance, innovation, slope, noise)
+            return self._update_range(estimate, measurement)
+        place, slope = predict_position(estimate.mean, measurement.point)
+        slope[:, HEADING] = 0.0  # the heading is odometry's
+        innovation = np.array([measurement.pose.x, measurement.pose.y]) - place
+        seen = expect(estimate.covariance, innovation, slope, measurement.covariance[:2, :2])
         return correct(estimate, seen, measurement.stamp), Innovation(
-            measurement.stamp, source, key, True, '', innovation, seen.spread, seen.nis, math.inf
+            measurement.stamp,
+            measurement.source,
+            '',
+            True,
+            '',
+            innovation,
+            seen.spread,
+            seen.nis,
+            math.inf,
         )
 
-    def _distance(self, mean: Vector, anchor: Anchor) -> tuple[float, Vector]:
-        """Return the distance to an anchor (Sun 38) and its slope, (1, 5)."""
-        place, _ = predict_position(mean, self._lever_arm[:2])
-        dx, dy = place[0] - anchor.position[0], place[1] - anchor.position[1]
-        distance = math.hypot(dx, dy, self._lever_arm[2] - anchor.position[2])
-        slope = np.zeros((1, _SIZE))
-        if distance > _NEAREST_M:
-            slope[0, :2] = dx / distance, dy / distance
-        return distance, slope
+    def _update_range(
+        self, estimate: Estimate, sample: RangeSample
+    ) -> tuple[Estimate, Innovation]:
+        anchor = self._anchors[sample.anchor_id]
+        distance, slope = expect_distance(estimate.mean, anchor.position, self._lever_arm)
+        innovation = np.asarray(sample.range_m - anchor.bias_m - distance)
+        mean, covariance, spread = correct_by_one(
+            estimate.mean,
+            estimate.covariance,
+            innovation,
+            slope,
+            self.config.sun.range_variance,
+        )
+        after = replace(estimate, stamp=sample.stamp, mean=mean, covariance=covariance)
+        return after, Innovation(
+            sample.stamp,
+            RANGE_SOURCE,
+            sample.anchor_id,
+            True,
+            '',
+            innovation[None],
+            spread[None, None],
+            float(innovation**2 / spread),
+            math.inf,
+        )

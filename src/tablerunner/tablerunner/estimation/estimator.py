@@ -214,6 +214,12 @@ class EstimatorConfig(Config):
         high=1.0,
         dynamic=True,
     )
+    range_scale_std: float = parameter(
+        0.005,
+        description="Prior deviation of each anchor's range error in proportion to the distance",
+        low=0.0,
+        high=0.2,
+    )
     default_range_std: float = parameter(
         0.1,
         unit='m',
@@ -248,7 +254,7 @@ class EstimatorConfig(Config):
         dynamic=True,
     )
     persistence: float = parameter(
-        0.6,
+        1.0,
         description=(
             'Mean innovation of an anchor, in standard deviations, beyond which it has been long '
             'for too long to be chance'
@@ -272,7 +278,7 @@ class EstimatorConfig(Config):
         dynamic=True,
     )
     doubt: float = parameter(
-        0.8,
+        1.0,
         description=(
             'The same for an anchor that has been short: nothing in the way makes it so, and the '
             'pose is doubted'

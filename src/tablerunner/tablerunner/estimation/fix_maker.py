@@ -60,7 +60,9 @@ class FixMaker:
             Must reach back to `sample.stamp`.
         """
         longest = nanoseconds(self._positioner.config.epoch)
-        if not self._positioner.gathered or abs(sample.stamp - self._instant) > longest:
+        late = abs(sample.stamp - self._instant) > longest
+        # An anchor that answers again, since another was not heard, begins a round of its own.
+        if not self._positioner.gathered or late or self._positioner.holds(sample.anchor_id):
             self._instant = sample.stamp
         anchor = self._anchors[sample.anchor_id]
         then, first = (

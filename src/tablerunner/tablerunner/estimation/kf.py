@@ -10,23 +10,55 @@ odometry grows with the way, along it and across it, and a robot that stands gat
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tablerunner.estimation.estimator import (
     EstimatorConfig,
     Measurement,
     RangeByRange,
     Start,
+    SunConfig,
     no_use,
 )
 from tablerunner.estimation.models.position_model import predict_position
 from tablerunner.estimation.models.range_model import Point3
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
-from tablerunner.types import Anchor, Estimate, Innovation, PoseSample
+from tablerunner.types import Anchor, Estimate, Innovation, PoseSample, Vector
 
 STATE_NAMES = ('x', 'y', 'heading')
+
+
+class Weighed(NamedTuple):
+    """What positions do to places, each axis for itself, for any leading axes."""
+
+    moved: Vector  # (..., 2), what is added to the place [m]
+    variance: Vector  # (..., 2), afterwards [m^2]
+    spread: Vector  # (..., 2), of the innovation [m^2]
+    accepted: NDArray[np.bool_]  # (...)
+
+
+def weigh(config: SunConfig, variance: Vector, innovation: Vector) -> Weighed:
+    """Return the correction by positions (Sun 21, 22, 24).
+
+    Parameters
+    ----------
+    config : SunConfig
+    variance : ndarray, shape (..., 2)
+        Of the places before [m^2].
+    innovation : ndarray, shape (..., 2)
+        Measured less expected [m].
+    """
+    noise = config.position_variance
+    spread = variance + noise
+    accepted = np.hypot(innovation[..., 0], innovation[..., 1]) <= config.largest_offset
+    gain = np.where(accepted[..., None], variance / spread, 0.0)
+    left = (1.0 - gain) ** 2 * variance + gain**2 * noise
+    return Weighed(gain * innovation, left, spread, accepted)
 
 
 class Kf(RangeByRange):
@@ -78,18 +110,14 @@ class Kf(RangeByRange):
             return no_use(estimate, measurement, 'kf takes positions only')
         expected, _ = predict_position(estimate.mean, measurement.point)
         innovation = np.array([measurement.pose.x, measurement.pose.y]) - expected
-        before = np.diagonal(estimate.covariance)[:2]
-        noise = self.config.sun.position_variance
-        spread = before + noise
-        accepted = math.hypot(*innovation) <= self.config.sun.largest_offset
+        weighed = weigh(self.config.sun, np.diagonal(estimate.covariance)[:2], innovation)
+        accepted = bool(weighed.accepted)
         after = estimate
         if accepted:
-            gain = before / spread
             mean = estimate.mean.copy()
-            mean[:2] += gain * innovation
-            left = (1.0 - gain) ** 2 * before + gain**2 * noise
-            covariance = np.diag([*left, estimate.covariance[2, 2]])
-            after = Estimate(measurement.stamp, mean, covariance)
+            mean[:2] += weighed.moved
+            covariance = np.diag([*weighed.variance, estimate.covariance[2, 2]])
+            after = replace(estimate, stamp=measurement.stamp, mean=mean, covariance=covariance)
         return after, Innovation(
             measurement.stamp,
             measurement.source,
@@ -97,7 +125,7 @@ class Kf(RangeByRange):
             accepted,
             '' if accepted else 'UWB and odometry disagree',
             innovation,
-            np.diag(spread),
-            float(np.sum(innovation**2 / spread)),
+            np.diag(weighed.spread),
+            float(np.sum(innovation**2 / weighed.spread)),
             math.inf,
         )

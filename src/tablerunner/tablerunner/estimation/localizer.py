@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tablerunner.errors import CovarianceError
-from tablerunner.estimation.checks import check_pose, check_range
+from tablerunner.estimation.checks import check_odometry, check_pose, check_range
 from tablerunner.estimation.compass import Compass
 from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
 from tablerunner.estimation.evidence import Evidence
@@ -16,9 +16,11 @@ from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
 from tablerunner.estimation.registry import ESTIMATORS
 from tablerunner.estimation.start_finder import StartFinder
-from tablerunner.estimation.status import LocalizerState, LocalizerStatus
+from tablerunner.estimation.status import Cause, LocalizerState, LocalizerStatus, tracking
 from tablerunner.estimation.timeline import Timeline
 from tablerunner.estimation.track import OdometryTrack, plausible
+from tablerunner.estimation.uwb_health import UwbHealth
+from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
 from tablerunner.stream import Order, StampOrder
 from tablerunner.types import (
@@ -31,7 +33,6 @@ from tablerunner.types import (
     RangeSample,
     Refusal,
     nanoseconds,
-    seconds,
 )
 from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
@@ -60,6 +61,9 @@ class Localizer:
         self._anchors: tuple[Anchor, ...] = ()
         self._anchor_ids: frozenset[str] = frozenset()
         self._fixes = FixMaker(config.positioner, (), self._lever_arm)
+        self._health = UwbHealth(config.health, config.filter, (), self._lever_arm)
+        self._fusing = True
+        self._starts = 0
         self._compass = Compass(config.compass)
         self._clear()
         self.set_anchors(anchors)
@@ -68,13 +72,13 @@ class Localizer:
         self._pending = _initial_pose(self.config)
         self._track = OdometryTrack()
         self._fixes.reset()
+        self._health.begin(0)
         self._compass.reset()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
         self._suspect: OdometrySample | None = None
         self._lost = False
         self._evidence = Evidence()
-        self._accepted_stamp = 0
         self._forget_start()
 
     def _forget_start(self) -> None:
@@ -90,11 +94,20 @@ class Localizer:
     # -- configuration ------------------------------------------------------------------------
 
     def configure(self, config: LocalizerConfig) -> None:
-        """Use other dynamic settings from now on; the estimate goes on."""
-        self.config = config
+        """Use other dynamic settings from now on; the estimate goes on.
+
+        Another estimator begins at the pose of the one before it.
+        """
+        before, self.config = self.config, config
         self._fixes.configure(config.positioner)
         self._compass.config = config.compass
-        if self._timeline is not None:
+        self._health.configure(config.health, config.filter)
+        if self._timeline is None:
+            return
+        if config.estimator != before.estimator:
+            self._fixes.reset()
+            self._begin_again(self._timeline.newest)
+        else:
             self._timeline.estimator = self._new_estimator()
 
     def set_anchors(self, anchors: tuple[Anchor, ...]) -> None:
@@ -103,14 +116,20 @@ class Localizer:
             return
         self._fixes = FixMaker(self.config.positioner, anchors, self._lever_arm)
         self._anchors = anchors
+        self._health = UwbHealth(self.config.health, self.config.filter, anchors, self._lever_arm)
         self._anchor_ids = frozenset(anchor.anchor_id for anchor in anchors)
         self._forget_start()
         if self._timeline is not None:
-            newest = self._timeline.newest
-            self._begin(Start(newest.stamp, newest.mean[:3], newest.pose_covariance))
+            self._begin_again(self._timeline.newest)
+
+    def switch(self, on: bool) -> None:
+        """Switch fusion on or off; while it is off, odometry alone carries the pose."""
+        if on and not self._fusing and len(self._track):
+            self._health.begin(self._track.newest.stamp)
+        self._fusing = on
 
     def reset(self) -> None:
-        """Forget everything but anchors and settings; begin as at the start."""
+        """Forget everything but anchors, settings and switch; begin as at the start."""
         self._clear()
 
     def _new_estimator(self) -> Estimator:
@@ -123,10 +142,14 @@ class Localizer:
     def status(self) -> LocalizerStatus:
         """State of the localiser and what to say about it."""
         if self._timeline is not None:
-            silent = seconds(self._timeline.newest.stamp - self._accepted_stamp)
-            silent = silent if self._accepted_stamp else 0.0
-            words = f'no measurement accepted for {silent:.1f} s' if silent > 1.0 else 'tracking'
-            return LocalizerStatus(LocalizerState.TRACKING, words, silent)
+            now, config = self._track.newest.stamp, self.config
+            cause = self._health.cause(now)
+            if not self._fusing:
+                cause = Cause.SWITCHED_OFF
+            elif config.estimator == 'dead_reckoning':
+                cause = Cause.CHOSEN
+            unfused, withheld = self._health.unfused_s(now), self._health.withholds
+            return tracking(cause, unfused, config.health.silence, withheld=withheld)
         if not self._anchors:
             return LocalizerStatus(LocalizerState.WAITING, 'no anchors yet')
         if not len(self._track):
@@ -136,6 +159,16 @@ class Localizer:
             return LocalizerStatus(LocalizerState.LOST, f'lost; {words}')
         state = LocalizerState.ALIGNING if self._finder.count else LocalizerState.WAITING
         return LocalizerStatus(state, words)
+
+    @property
+    def starts(self) -> int:
+        """How often an estimate began: between two numbers the pose may have jumped anywhere."""
+        return self._starts
+
+    @property
+    def fusing(self) -> bool:
+        """Whether measurements are taken (`switch`)."""
+        return self._fusing
 
     @property
     def estimate(self) -> Estimate | None:
@@ -165,14 +198,10 @@ class Localizer:
 
     def add_odometry(self, sample: OdometrySample) -> Outcome:
         """Take odometry; the estimate moves on to its stamp."""
-        order = self._order.judge(sample.stamp)
-        if order is Order.ZERO or not (
-            sample.pose.is_finite
-            and math.isfinite(sample.linear_m_s)
-            and math.isfinite(sample.angular_rad_s)
-        ):
-            reason = 'zero stamp' if order is Order.ZERO else 'not finite'
+        reason = check_odometry(sample, self.config.max_speed, self.config.max_turn_rate)
+        if reason:
             return _refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
+        order = self._order.judge(sample.stamp)
         restarted: tuple[Refusal, ...] = ()
         if order is Order.RESTARTED:
             self._clear()
@@ -187,25 +216,25 @@ class Localizer:
         self._track.add(sample)
         self._track.trim(sample.stamp - nanoseconds(self.config.alignment.window))
         if self._pending is not None and self._anchors:
+            # Given before there was odometry: it holds for the first, whenever that may be.
             pending, self._pending = self._pending, None
-            stamp = pending.stamp or sample.stamp
-            self._begin(Start(stamp, _vector(pending.pose), pending.covariance))
+            self._begin(Start(sample.stamp, _vector(pending.pose), pending.covariance))
             return Outcome(self.estimate, (), restarted)
         return Outcome(None, (), restarted)
 
     def add_range(self, sample: RangeSample) -> Outcome:
         """Take a range: correct the estimate, or help to find its start."""
-        reason = check_range(sample, self._anchor_ids) or self._place_fault(sample.stamp)
+        reason = self._switch_fault() or check_range(sample, self._anchor_ids)
+        reason = reason or self._place_fault(sample.stamp)
         if reason:
+            self._health.hear(sample, False, self._track)
             return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
         if self._timeline is not None:
+            self._health.compare(sample, self._track, self._timeline)
             if self._timeline.estimator.takes_positions:
+                self._health.hear(sample, None, self._track)
                 return self._add_fix(sample)
-            innovation = self._timeline.add(sample)
-            if innovation is None:
-                return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, 'repeated')
-            self._watch(innovation)
-            return Outcome(self.estimate, (innovation,))
+            return self._correct(sample, RANGE_SOURCE, sample.anchor_id)
         alignment = self._finder.add(sample, self._track)
         if alignment is None:
             return Outcome()
@@ -229,16 +258,13 @@ class Localizer:
         """
         if sample.source == UWB_FIX_SOURCE:
             sample = replace(sample, point=self._lever_arm[:2])
-        reason = check_pose(sample) or self._place_fault(sample.stamp)
+        reason = self._switch_fault() or check_pose(sample) or self._place_fault(sample.stamp)
         if not reason and self._timeline is None:
             reason = 'start not known yet'
-        if reason or self._timeline is None:
+        if reason:
+            self._health.hear(sample, False, self._track)
             return _refused(sample.stamp, sample.source, '', reason)
-        innovation = self._timeline.add(sample)
-        if innovation is None:
-            return _refused(sample.stamp, sample.source, '', 'repeated')
-        self._watch(innovation)
-        return Outcome(self.estimate, (innovation,))
+        return self._correct(sample, sample.source, '')
 
     def add_magnetic(self, sample: MagneticSample) -> Outcome:
         """Take a magnetic field: a heading, where it is plausible and the start is known."""
@@ -247,7 +273,7 @@ class Localizer:
             return Outcome(None, (), (heading,))
         if heading is None:
             return Outcome()
-        reason = self._place_fault(sample.stamp)
+        reason = self._switch_fault() or self._place_fault(sample.stamp)
         if not reason and self._timeline is None:
             reason = 'start not known yet'
         if reason or self._timeline is None:
@@ -269,22 +295,44 @@ class Localizer:
         if not reason and sample.stamp < self._track.oldest_stamp:
             reason = 'older than the history'
         if reason:
-            return _refused(sample.stamp, INITIAL_POSE_SOURCE, '', reason)
+            return _refused(sample.stamp, sample.source, '', reason)
         try:
             self._begin(Start(sample.stamp, _vector(sample.pose), sample.covariance))
         except CovarianceError as error:
-            return _refused(sample.stamp, INITIAL_POSE_SOURCE, '', str(error))
+            return _refused(sample.stamp, sample.source, '', str(error))
         return Outcome(self.estimate)
 
     # -- inside -----------------------------------------------------------------------------------
+
+    def _correct(self, sample: RangeSample | PoseSample, source: str, key: str) -> Outcome:
+        """Let a measurement correct the estimate, or only be judged while UWB is not trusted."""
+        if self._timeline is None:
+            raise RuntimeError('there is no estimate to correct')
+        withhold = self._health.withholds and source in (RANGE_SOURCE, UWB_FIX_SOURCE)
+        innovation = self._timeline.add(sample, withhold=withhold)
+        if innovation is None:
+            return _refused(sample.stamp, source, key, 'repeated')
+        self._watch(innovation)
+        if withhold:
+            innovation = innovation._replace(accepted=False, reason=Cause.DISAGREE.value)
+        self._health.hear(sample, innovation.accepted, self._track)
+        return Outcome(self.estimate, (innovation,))
+
+    def _switch_fault(self) -> str:
+        return '' if self._fusing else Cause.SWITCHED_OFF.value
+
+    def _begin_again(self, estimate: Estimate) -> None:
+        """Begin a new estimate at the pose of this one."""
+        self._begin(Start(estimate.stamp, estimate.mean[:3], estimate.pose_covariance))
 
     def _begin(self, start: Start) -> None:
         self._timeline = Timeline(
             self._new_estimator(), self._track, start, nanoseconds(self.config.history)
         )
+        self._starts += 1
+        self._health.begin(start.stamp)
         self._lost = False
         self._evidence = Evidence()
-        self._accepted_stamp = start.stamp
 
     def _place_fault(self, stamp: int) -> str:
         """Return why a measurement of this stamp has no place beside odometry; '' if it has."""
@@ -332,8 +380,6 @@ class Localizer:
         """Gather what speaks against the pose; when it is too much, the robot is lost."""
         if self.config.estimator == 'dead_reckoning' or not innovation.considered:
             return
-        if innovation.accepted:
-            self._accepted_stamp = max(self._accepted_stamp, innovation.stamp)
         self._evidence.add(innovation, nanoseconds(self.config.lost_window))
         evidence, config = self._evidence, self.config
         if (
@@ -355,7 +401,7 @@ def _initial_pose(config: LocalizerConfig) -> PoseSample | None:
 
 
 def _vector(pose: Pose2) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    return np.array([pose.x, pose.y, pose.heading])
+    return np.array([pose.x, pose.y, wrap(pose.heading)])
 
 
 def _refused(stamp: int, source: str, key: str, reason: str) -> Outcome:

@@ -10,6 +10,7 @@ from tablerunner.estimation.alignment import AlignmentConfig
 from tablerunner.estimation.compass import CompassConfig
 from tablerunner.estimation.estimator import EstimatorConfig
 from tablerunner.estimation.registry import ESTIMATORS
+from tablerunner.estimation.uwb_health import UwbHealthConfig
 from tablerunner.uwb import PositionerConfig
 
 
@@ -23,7 +24,7 @@ class LocalizerConfig(Config):
     """Everything that fusion_node and replay let a user set about estimation."""
 
     estimator: str = parameter(
-        'ekf', description='Which estimator runs', choices=tuple(ESTIMATORS)
+        'ekf', description='Which estimator runs', choices=tuple(ESTIMATORS), dynamic=True
     )
     tag_position: tuple[float, ...] = parameter(
         (0.0, 0.0, 1.1),
@@ -95,6 +96,9 @@ class LocalizerConfig(Config):
         above=0.0,
         high=3600.0,
         dynamic=True,
+    )
+    health: UwbHealthConfig = parameter(
+        factory=UwbHealthConfig, description='When odometry alone carries the pose'
     )
     filter: EstimatorConfig = parameter(factory=EstimatorConfig, description='Noise and gates')
     positioner: PositionerConfig = parameter(

@@ -56,6 +56,10 @@ class StartFinder:
         prior = bias_covariance(self._noise, len(self._anchors))
         alignment = align(self._window(track), prior, self.config)
         self.words = 'position still open' if alignment is None else alignment.words
+        if alignment is not None and alignment.contradicted:
+            # Wheels have spun, or hands have moved the robot, somewhere in this window: the newer
+            # half may be free of it.
+            self._samples = self._samples[len(self._samples) // 2 :]
         return alignment
 
     def start(self, alignment: Alignment) -> Start:

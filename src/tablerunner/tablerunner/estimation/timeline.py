@@ -19,6 +19,8 @@ _Key = tuple[int, int, str]  # stamp, rank, source key: a total order, whatever 
 
 _RANGE = 1
 """Rank of a range among entries of one stamp: after odometry, before poses."""
+_POSE, _WITHHELD = 2, 3
+"""What is withheld is only judged, after all that counts."""
 
 
 @dataclass(slots=True)
@@ -80,16 +82,36 @@ class Timeline:
         self._run(bisect_right(self._keys, (since, 99, '')))
         self._trim()
 
-    def add(self, measurement: Measurement) -> Innovation | None:
-        """Add a measurement; return what it did, None if the same one is already there."""
+    def add(self, measurement: Measurement, *, withhold: bool = False) -> Innovation | None:
+        """Add a measurement; return what it did, None if the same one is already there.
+
+        With `withhold` the estimate stays: the innovation says what it would have done.
+        """
         key = _key(measurement)
-        position = bisect_left(self._keys, key)
-        if position < len(self._keys) and self._keys[position] == key:
+        aside = (key[0], _WITHHELD, key[2])
+        if self._holds(key) or self._holds(aside):
             return None
-        index = self._insert(_Entry(key, measurement))
+        index = self._insert(_Entry(aside if withhold else key, measurement))
         innovation = self._run(index)
         self._trim()
         return innovation
+
+    def withhold_past(self, source: str) -> None:
+        """Take back all ranges and what `source` gave, as far as the history reaches."""
+        first = bisect_right(self._keys, (self.oldest_stamp, 99, ''))
+        entries = self._entries[first:]
+        for entry in entries:
+            stamp, rank, name = entry.key
+            if rank == _RANGE or (rank == _POSE and name == source):
+                entry.key = (stamp, _WITHHELD, name)
+        entries.sort(key=_by_key)
+        self._entries[first:] = entries
+        self._keys[first:] = [entry.key for entry in entries]
+        self._run(first)
+
+    def _holds(self, key: _Key) -> bool:
+        position = bisect_left(self._keys, key)
+        return position < len(self._keys) and self._keys[position] == key
 
     def _insert(self, entry: _Entry) -> int:
         index = bisect_right(self._keys, entry.key)
@@ -114,9 +136,10 @@ class Timeline:
             if samples:
                 estimate, innovations = self.estimator.update_ranges(estimate, samples)
             else:
-                measurement = self._entries[position].measurement
-                if measurement is not None:
-                    estimate, innovation = self.estimator.update(estimate, measurement)
+                entry = self._entries[position]
+                if entry.measurement is not None:
+                    after, innovation = self.estimator.update(estimate, entry.measurement)
+                    estimate = estimate if entry.key[1] == _WITHHELD else after
                     innovations = (innovation,)
             for offset in range(max(len(innovations), 1)):
                 self._entries[position + offset].after = estimate
@@ -154,7 +177,11 @@ class Timeline:
         self._track.trim(self._keys[0][0])
 
 
+def _by_key(entry: _Entry) -> _Key:
+    return entry.key
+
+
 def _key(measurement: Measurement) -> _Key:
     if isinstance(measurement, RangeSample):
         return (measurement.stamp, _RANGE, f'{measurement.anchor_id}/{measurement.tag_id}')
-    return (measurement.stamp, 2, measurement.source)
+    return (measurement.stamp, _POSE, measurement.source)

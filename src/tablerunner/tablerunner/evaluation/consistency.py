@@ -116,9 +116,14 @@ class SourceSummary:
 
 
 def summarize_innovations(innovations: Iterable[Innovation]) -> dict[str, SourceSummary]:
-    """Return for each source the share of accepted measurements and their NIS."""
+    """Return for each source the share of accepted measurements and their NIS.
+
+    Those that never reached the estimator say nothing about it and are left out.
+    """
     by_source: dict[str, list[Innovation]] = {}
     for item in innovations:
+        if not item.considered:
+            continue
         by_source.setdefault(item.source, []).append(item)
     return {
         source: SourceSummary(

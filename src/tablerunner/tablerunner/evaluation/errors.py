@@ -58,6 +58,11 @@ class ErrorSeries:
         """Distance between estimate and truth, shape (n,) [m]."""
         return np.hypot(self.errors[:, 0], self.errors[:, 1])
 
+    def since(self, stamp: int) -> ErrorSeries:
+        """Return the errors from a time [ns] on."""
+        rows = self.stamps >= stamp
+        return ErrorSeries(self.stamps[rows], self.errors[rows], self.covariances[rows])
+
     def summary(self) -> ErrorSummary:
         """Return the size of the errors."""
         if not len(self.stamps):

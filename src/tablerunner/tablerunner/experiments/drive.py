@@ -31,9 +31,9 @@ from tablerunner.uwb import Positioner, PositionerConfig, Ranger, RangerConfig
 Array = NDArray[np.float64]
 Route = tuple[tuple[float, float], ...]
 
-_NEAR_M = 0.05
-_ALIGNED_RAD = 0.15
-_LONGEST_S = 1800.0
+NEAR_M = 0.05
+ALIGNED_RAD = 0.15
+LONGEST_S = 1800.0
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,9 @@ def drive_route(
     target = 0
     while target < len(route):
         pose = simulator.truth.pose
-        if simulator.now_ns - begin > _LONGEST_S * 1e9:
+        if simulator.now_ns - begin > LONGEST_S * 1e9:
             raise TablerunnerError(f'{scenario.name}: point {target} of the route was not reached')
-        if math.dist((pose.x, pose.y), route[target]) < _NEAR_M:
+        if math.dist((pose.x, pose.y), route[target]) < NEAR_M:
             target += 1
             continue
         waiting = simulator.now_ns - begin < still_s * 1e9
@@ -180,6 +180,6 @@ def errors_of(drive: Drive, stamps: NDArray[np.int64], places: Array) -> Array:
 def _steer(pose: Pose2, goal: tuple[float, float], speed: float) -> Velocity:
     ahead = math.dist((pose.x, pose.y), goal)
     turn = wrap(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.heading)
-    if abs(turn) > _ALIGNED_RAD:
+    if abs(turn) > ALIGNED_RAD:
         return Velocity(0.0, math.copysign(min(0.8, 2.0 * abs(turn) + 0.1), turn))
     return Velocity(min(speed, 0.8 * ahead + 0.05), 1.5 * turn)

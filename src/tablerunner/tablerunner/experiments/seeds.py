@@ -9,12 +9,13 @@ from typing import TypeVar
 
 from tablerunner.experiments.experiment import Progress
 
+S = TypeVar('S')
 T = TypeVar('T')
 
 
 def run_seeds(
-    run: Callable[[int], T],
-    seeds: Sequence[int],
+    run: Callable[[S], T],
+    seeds: Sequence[S],
     progress: Progress = lambda done, count: None,
     workers: int | None = None,
 ) -> list[T]:
@@ -25,7 +26,8 @@ def run_seeds(
     run : callable
         A function of a module (it is sent to other processes), pure but for its seed: the result
         does not depend on the number of workers.
-    seeds : sequence of int
+    seeds : sequence
+        Seeds, or whatever else a run is made of: a tuple of seeds that are run at once.
     progress : callable, optional
         Called after each seed.
     workers : int, optional

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from tablerunner.types import Innovation
 
 
 def innovation_from_message(message: Any) -> Innovation:
-    """Return the innovation of a message."""
+    """Return the innovation of a message; one without NIS never reached an estimator."""
     size = len(message.innovation)
     return Innovation(
         stamp=stamp_from_message(message.header.stamp),
@@ -25,4 +26,5 @@ def innovation_from_message(message: Any) -> Innovation:
         ),
         nis=message.nis,
         gate=message.gate,
+        considered=not math.isnan(message.nis),
     )

@@ -59,7 +59,11 @@ class GyroConfig(Config):
 
 
 class Gyro:
-    """Integrates yaw rate; the trapezoid between samples, the last rate held beyond the newest."""
+    """Integrates yaw rate; beyond the newest sample its rate is held.
+
+    A reading is taken for the mean rate since the one before: gyroscopes run many times faster
+    inside than they are read, and give averages.
+    """
 
     def __init__(self, config: GyroConfig) -> None:
         self.config = config
@@ -89,7 +93,7 @@ class Gyro:
         if self._stamp:
             dt = seconds(sample.stamp - self._stamp)
             if dt <= self.config.timeout:
-                self._angle += 0.5 * (rate + self._rate) * dt
+                self._angle += rate * dt
         self._stamp = sample.stamp
         self._rate = rate
         return None

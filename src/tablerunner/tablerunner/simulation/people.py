@@ -14,7 +14,7 @@ from tablerunner.scenario import Person
 from tablerunner.simulation.streams import stream
 from tablerunner.simulation.truth import PersonState
 
-_AHEAD_RAD = math.radians(70.0)  # the robot is in the way within this of the walking direction
+AHEAD_RAD = math.radians(70.0)  # the robot is in the way within this of the walking direction
 
 
 class Walker:
@@ -33,7 +33,7 @@ class Walker:
         self._pause_s = 0.0
         self._waited_s = 0.0
         self._yields: bool | None = None  # None: no robot in the way
-        self._x, self._y, self._next = _place(person)
+        self._x, self._y, self._next = place_on_route(person)
         self._heading = 0.0
         self._heading = self._course()
         self.speed_m_s = 0.0
@@ -64,7 +64,7 @@ class Walker:
     def _must_stop(self, robot: Pose2, robot_radius_m: float) -> bool:
         dx, dy = robot.x - self._x, robot.y - self._y
         gap = math.hypot(dx, dy) - robot_radius_m - self._person.radius
-        ahead = abs(wrap(math.atan2(dy, dx) - self._heading)) < _AHEAD_RAD
+        ahead = abs(wrap(math.atan2(dy, dx) - self._heading)) < AHEAD_RAD
         if gap > self._person.yield_distance or not ahead:
             self._yields = None
             return False
@@ -113,7 +113,7 @@ class Walker:
         return math.atan2(to_y - self._y, to_x - self._x)
 
 
-def _place(person: Person) -> tuple[float, float, int]:
+def place_on_route(person: Person) -> tuple[float, float, int]:
     """Return where on the route the walk begins and the index of the way point ahead."""
     route = list(person.route)
     if len(route) < 2:

@@ -16,16 +16,16 @@ from tablerunner.simulation.streams import stream
 from tablerunner.simulation.truth import PersonState, RangeTruth
 from tablerunner.types import ExchangeSample, seconds
 
-_LIGHT_M_S = 299_792_458.0
+LIGHT_M_S = 299_792_458.0
 _SEND_GRID = 512  # delayed sending takes the nine lowest bits as zero
 _SEQUENCES = 1 << 32
-_POWER_AT_1M_DBM = -63.0  # -14.3 dBm sent, less 48.7 dB of free space at 6.5 GHz
+POWER_AT_1M_DBM = -63.0  # -14.3 dBm sent, less 48.7 dB of free space at 6.5 GHz
 
 # How far the first path lies under the whole signal, for the least and the most detour, and how
 # much of the signal is lost [dB]. Less than about 6 dB tells of a line of sight, more than 10 dB
 # of none (the rule of the radios' maker); a thin obstacle lies between.
-_GAP_DB = {'': (3.0, 3.0), 'person': (7.5, 13.0), 'thing': (9.0, 17.0)}
-_LOSS_DB = {'': 0.0, 'person': 5.0, 'thing': 8.0}
+GAP_DB = {'': (3.0, 3.0), 'person': (7.5, 13.0), 'thing': (9.0, 17.0)}
+LOSS_DB = {'': 0.0, 'person': 5.0, 'thing': 8.0}
 
 
 class Radio:
@@ -121,13 +121,13 @@ class Radio:
         std = math.hypot(errors.range_std, extra)
         late = self.bias_m[anchor.id] + self.scale[anchor.id] * distance + excess
         noise = [float(draw) * std * math.sqrt(16.0 / 6.0) for draw in normal[:3]]
-        flights = [(distance + late + part) / _LIGHT_M_S for part in noise]
+        flights = [(distance + late + part) / LIGHT_M_S for part in noise]
         low, high = errors.reply_delay
         delays = [low + (high - low) * float(draw) for draw in uniform[1:]]
         times = _exchange_times(self._tag_clock, clock, flights, delays)
-        power = _POWER_AT_1M_DBM - 20.0 * math.log10(max(distance, 0.1)) - _LOSS_DB[blocked]
+        power = POWER_AT_1M_DBM - 20.0 * math.log10(max(distance, 0.1)) - LOSS_DB[blocked]
         power += errors.power_std * float(normal[3])
-        thin, thick = _GAP_DB[blocked]
+        thin, thick = GAP_DB[blocked]
         gap = max(thin + (thick - thin) * detour + errors.power_std * float(normal[4]), 0.0)
         sample = ExchangeSample(
             stamp,

@@ -53,6 +53,35 @@ class Sight:
         hit = ~parallel & (on_edge >= 0) & (on_edge <= 1) & (on_sight > end) & (on_sight < 1 - end)
         return bool(np.any(hit & (tag[2] + on_sight * dz < self._heights)))
 
+    def thing_blocks_many(
+        self, tag: Array, height: float, anchor: tuple[float, float, float]
+    ) -> NDArray[np.bool_]:
+        """Return `thing_blocks` of many tags of one height at once, shape (runs,).
+
+        Parameters
+        ----------
+        tag : ndarray, shape (2, runs)
+            In map [m].
+        height : float
+            Of the tags [m].
+        anchor : tuple
+            In map [m].
+        """
+        dx, dy, dz = anchor[0] - tag[0], anchor[1] - tag[1], anchor[2] - height
+        flat_m = np.maximum(np.hypot(dx, dy), 1e-12)
+        along_x, along_y = self._along[:, :1], self._along[:, 1:]  # (segments, 1)
+        determinant = dx * along_y - dy * along_x
+        parallel = np.abs(determinant) < 1e-12
+        safe = np.where(parallel, 1.0, determinant)
+        off_x = self._segments[:, 0, :1] - tag[0]
+        off_y = self._segments[:, 0, 1:] - tag[1]
+        on_sight = (off_x * along_y - off_y * along_x) / safe
+        on_edge = (off_x * dy - off_y * dx) / safe
+        end = _NEAR_END_M / flat_m
+        hit = ~parallel & (on_edge >= 0) & (on_edge <= 1) & (on_sight > end) & (on_sight < 1 - end)
+        hit &= height + on_sight * dz < self._heights[:, None]
+        return np.asarray(hit.any(axis=0) & (flat_m >= 2 * _NEAR_END_M))
+
 
 def person_blocks(
     tag: tuple[float, float, float],

@@ -114,6 +114,10 @@ class Positioner:
         """How many ranges of an unfinished epoch there are."""
         return len(self._epoch)
 
+    def holds(self, anchor_id: str) -> bool:
+        """Whether the unfinished epoch has a range of an anchor: another one would end it."""
+        return anchor_id in self._epoch
+
     def add(self, sample: RangeSample) -> PoseSample | Refusal | None:
         """Take one range; return the fix of the epoch that it completes, if it does.
 

@@ -101,12 +101,12 @@ def test_help_names_every_command_and_starts_fast() -> None:
     )
     took = time.perf_counter() - begun
     assert done.returncode == 0, done.stderr
-    for name in ('replay', 'info', 'plot', 'convert'):
+    for name in ('replay', 'info', 'plot', 'convert', 'tune'):
         assert name in done.stdout
     assert took < 10.0  # half a second alone; other tests run beside it
 
 
-@pytest.mark.parametrize('command', ['replay', 'info', 'plot', 'convert labyrinth'])
+@pytest.mark.parametrize('command', ['replay', 'info', 'plot', 'convert labyrinth', 'tune'])
 def test_every_command_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([*command.split(), '--help']) == 0
     assert f'Example: tablerunner {command}' in capsys.readouterr().out
@@ -169,6 +169,13 @@ def test_plot_writes_a_picture(bag: Path, tmp_path: Path) -> None:
         (['info', '{tmp}/missing'], 'there is no bag at'),
         (['plot', '{tmp}/missing'], 'there is no bag at'),
         (['replay', '{bag}', '--estimator', 'magic'], "estimator: got 'magic', expected one of"),
+        (['replay', '{bag}', '--estimator', 'ekf,magic'], 'ddf, dead_reckoning, all'),
+        (['replay', '{bag}', '--estimator', 'kf', '--smooth'], "--smooth: got 'kf', expected one"),
+        (['replay', '{bag}', '--estimator', 'all', '--plot', '{tmp}/x.png'], 'one estimator'),
+        (['tune', '{tmp}/missing'], 'there is no bag at'),
+        (['tune', '{bag}', '--estimator', 'kf'], "--estimator: got 'kf', expected ekf or ukf"),
+        (['tune', '{bag}', '--out', '{bag}/scenario.yaml'], 'a file that does not exist yet'),
+        (['tune', '{bag}', '--out', '{tmp}/x.json'], 'a name that ends with .yaml'),
         (['replay', '{bag}', '--start', '1,2'], "--start: got '1,2', expected X,Y,YAW"),
         (['replay', '{bag}', '--scenario', '{tmp}/no.yaml'], 'a readable file'),
         (['replay', '{bag}', '--namespace', 'robot2'], 'in namespace robot2'),

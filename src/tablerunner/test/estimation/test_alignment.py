@@ -126,3 +126,25 @@ def test_start_from_config_needs_no_driving(room):
     outcome = localizer.add_odometry(drive.odometry[0])
     assert outcome.estimate.mean[:3] == pytest.approx([4.0, 3.0, 0.8])
     assert localizer.status.state is LocalizerState.TRACKING
+
+
+def test_start_is_not_believed_before_a_metre_is_driven(room):
+    """A short way with biased ranges can point anywhere; how far is a parameter."""
+    for least in (0.5, 1.0, 2.0):
+        config = CONFIG.replace(alignment=CONFIG.alignment.replace(min_driven=least))
+        for seed in range(5):
+            drive = room.drive(seed, seconds=12.0)
+            _, _, begun = run(room, drive, config)
+            driven = 0.5 * (begun.stamp - drive.odometry[0].stamp) * 1e-9
+            assert driven >= least - 0.02
+
+
+def test_start_is_not_believed_of_wheels_that_spin_on_the_spot(room):
+    """Odometry drives 10 m, ranges say that the robot stands: no pose is given out."""
+    for seed in range(5):
+        spinning = room.drive(seed, seconds=20.0)
+        standing = room.drive(seed, seconds=20.0, still=20.0)
+        drive = type(spinning)(spinning.odometry, standing.ranges, spinning.truth)
+        localizer, _, begun = run(room, drive)
+        assert begun is None
+        assert localizer.status.state is LocalizerState.ALIGNING

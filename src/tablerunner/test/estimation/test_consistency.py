@@ -24,7 +24,10 @@ def run(room, seed):
     rng = np.random.default_rng(seed)
     scale = rng.normal(0, CONFIG.scale_std)
     drift = rng.normal(0, CONFIG.gyro_bias_std)
+    turn_scale = rng.normal(0, CONFIG.turn_scale_std)
+    delay = rng.normal(0, CONFIG.range_delay_std)
     biases = rng.multivariate_normal(np.zeros(4), bias_covariance(CONFIG, 4))
+    scales = rng.normal(0, CONFIG.range_scale_std, 4)
     start = np.array([6.0, 4.5, 0.3])
     true = Pose2(*(start + rng.normal(0, PRIOR)))
     ekf = Ekf(CONFIG, room.anchors, room.lever)
@@ -35,18 +38,22 @@ def run(room, seed):
         distance, turn = CONFIG.motion.variances(told)
         real = Motion(
             (1 + scale) * (told.distance_m + rng.normal(0, math.sqrt(distance))),
-            told.turn_rad - drift * 0.04 + rng.normal(0, math.sqrt(turn)),
+            (1 + turn_scale) * (told.turn_rad + rng.normal(0, math.sqrt(turn))) - drift * 0.04,
             0.04,
         )
         true = advance(true, real)
         scale += rng.normal(0, CONFIG.scale_walk * math.sqrt(0.02))
+        turn_scale += rng.normal(0, CONFIG.turn_scale_walk * math.sqrt(abs(told.turn_rad)))
+        delay += rng.normal(0, CONFIG.range_delay_walk * 0.2)
         drift += rng.normal(0, CONFIG.gyro_bias_walk * 0.2)
         biases += rng.normal(0, CONFIG.range_bias_walk * 0.2, 4)
         estimate = ekf.predict(estimate, told, k + 1)
         anchor: Anchor = room.anchors[k % 4]
-        tag = true.transform(np.array(room.lever[:2]))
+        share = -delay / 0.04  # the stamp is late: the ranging was before
+        then = advance(true, Motion(share * real.distance_m, share * real.turn_rad, 0.04))
+        tag = then.transform(np.array(room.lever[:2]))
         measured = math.dist((*tag, room.lever[2]), anchor.position)
-        measured += biases[k % 4] + rng.normal(0, 0.1)
+        measured += scales[k % 4] * measured + biases[k % 4] + rng.normal(0, 0.1)
         sample = RangeSample(k + 1, anchor.anchor_id, 'tag', k, measured, 0.01)
         estimate, innovation = ekf.update(estimate, sample)
         nis.append(innovation.nis)

@@ -8,7 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tablerunner.estimation.models.motion_model import input_noise, move, move_many, transport
-from tablerunner.estimation.models.range_model import predict_range, predict_range_many
+from tablerunner.estimation.models.range_model import (
+    predict_range,
+    predict_range_many,
+    predict_ranges,
+)
 from tablerunner.estimation.models.state import HEADING, RANGE_BIAS, RANGE_DELAY
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
@@ -23,6 +27,8 @@ STATES = st.tuples(
     st.floats(-0.1, 0.1),
     st.floats(-0.3, 0.3),
     st.floats(-0.3, 0.3),
+    st.floats(-0.05, 0.05),
+    st.floats(-0.05, 0.05),
 ).map(np.array)
 TWISTS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.5, 1.5))
 MOTIONS = st.builds(Motion, st.floats(0.001, 0.3), st.floats(-0.5, 0.5), st.floats(0.01, 0.2))
@@ -89,7 +95,7 @@ def test_move_many_equals_move(mean, motion):
 
 def test_move_at_standstill_holds_the_heading_against_the_bias():
     """Where odometry says nothing moved, the gyro's bias turns nothing."""
-    mean = np.array([1.0, 2.0, 0.5, 0.01, 0.01, 0.02, 0.0, 0.1])
+    mean = np.array([1.0, 2.0, 0.5, 0.01, 0.01, 0.02, 0.0, 0.1, 0.01])
     moved, by_state, _ = move(mean, Motion(0.0, 0.0, 10.0))
     assert np.array_equal(moved, mean)
     assert np.array_equal(by_state, np.eye(len(mean)))
@@ -117,9 +123,21 @@ def test_predict_range_many_equals_predict_range(mean, twist):
         assert value == pytest.approx(predict_range(alone, anchor, arm, 1, twist)[0], abs=1e-12)
 
 
+@given(STATES, TWISTS)
+def test_predict_ranges_are_each_predict_range(mean, twist):
+    """Several anchors at one instant: the same values and rows, to the last bit."""
+    arm = (0.2, -0.1, 1.1)
+    anchors = [((13.0, 4.0, 2.25), 1), ((-3.0, 8.0, 2.0), 0)]
+    expected, jacobian = predict_ranges(mean, anchors, arm, twist)
+    for value, row, (anchor, index) in zip(expected, jacobian, anchors, strict=True):
+        alone, slope = predict_range(mean, anchor, arm, index, twist)
+        assert value == alone
+        assert np.array_equal(row, slope)
+
+
 def test_predict_range_of_late_stamps_is_where_the_robot_was():
     """At 0.5 m/s away from the anchor, a stamp 0.1 s late has read 5 cm less."""
-    mean = np.zeros(8)
+    mean = np.zeros(9)
     mean[RANGE_DELAY] = 0.1
     expected, _ = predict_range(mean, (-10.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, (0.5, 0.0))
     assert expected == pytest.approx(9.95)
@@ -127,8 +145,8 @@ def test_predict_range_of_late_stamps_is_where_the_robot_was():
 
 def test_predict_range_adds_the_bias_of_its_own_anchor():
     """A tag 3-4-12 away reads 13 and its bias; a tag on the anchor has no direction."""
-    mean = np.array([3.0, 4.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.2])
-    assert predict_range(mean, (0, 0, 12), (0, 0, 0), 1)[0] == pytest.approx(13.2)
+    mean = np.array([3.0, 4.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.0, 0.01])
+    assert predict_range(mean, (0, 0, 12), (0, 0, 0), 1)[0] == pytest.approx(13.33)
     touching, jacobian = predict_range(mean, (3, 4, 0), (0, 0, 0), 0)
     assert touching == pytest.approx(0.1)
     assert np.all(jacobian[:3] == 0.0)

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tablerunner.estimation import Localizer, LocalizerConfig
-from tablerunner.types import OdometrySample
+from tablerunner.geometry.pose import Pose2
+from tablerunner.types import OdometrySample, PoseSample
 
 CONFIG = LocalizerConfig(
     tag_position=(-0.1, 0.05, 1.1),
@@ -18,6 +19,8 @@ CONFIG = LocalizerConfig(
 def feed(localizer, sample):
     if isinstance(sample, OdometrySample):
         return localizer.add_odometry(sample)
+    if isinstance(sample, PoseSample):
+        return localizer.add_pose(sample)
     return localizer.add_range(sample)
 
 
@@ -57,6 +60,59 @@ def test_ranges_late_by_up_to_half_a_second_change_nothing(room, seed, delay):
     delayed, refused = run(room, shuffled)
     assert none == refused == 0
     assert_equal(on_time, delayed)
+
+
+def with_poses(drive, seed, every=13):
+    """Return the samples of a drive in order, with poses of a camera and fixes of UWB among them.
+
+    Some stand at the stamp of an odometry sample, some between two.
+    """
+    rng = np.random.default_rng(seed)
+    poses = []
+    for count, stamp in enumerate(sorted(drive.truth)[5::every]):
+        true = drive.truth[stamp]
+        source, heading = ('camera/pose', 1e-3) if count % 2 else ('uwb/pose', np.inf)
+        dx, dy, turn = rng.normal(0, 0.05, 3)
+        seen = Pose2(true.x + dx, true.y + dy, true.heading + turn)
+        covariance = np.diag([2.5e-3, 2.5e-3, heading])
+        poses.append(PoseSample(stamp + 3_000_000 * (count % 3), seen, covariance, source))
+    both = [*in_time(drive), *poses]
+    return sorted(both, key=lambda s: (s.stamp, not isinstance(s, OdometrySample)))
+
+
+@pytest.mark.parametrize('estimator', ['ekf', 'ukf', 'ekf_cv'])
+@settings(
+    max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.integers(0, 10**6), st.floats(0.0, 0.5))
+def test_late_early_and_repeated_data_of_all_kinds_change_nothing(room, estimator, seed, delay):
+    """Ranges and poses up to 0.5 s late or 0.1 s before their odometry, some of them twice.
+
+    Each repetition is refused as such; all else is used and ends in the same bits as in order.
+    """
+    rng = np.random.default_rng(seed)
+    samples = with_poses(room.drive(8, seconds=2.5), 1)
+    config = CONFIG.replace(estimator=estimator)
+    reference = Localizer(config, room.anchors)
+    for sample in samples:
+        assert not feed(reference, sample).refusals
+    arrivals = []
+    for sample in samples:
+        if isinstance(sample, OdometrySample):
+            arrivals.append((sample.stamp, sample, False))
+            continue
+        # Nothing has a place before the first odometry, nor before the start stands.
+        early = 0.1 * (sample.stamp > 1_200_000_000)
+        at = sample.stamp + rng.uniform(-early, max(delay, 1e-3)) * 1e9
+        arrivals.append((at, sample, False))
+        if rng.uniform() < 0.2:
+            arrivals.append((at + rng.uniform(0, 0.3) * 1e9, sample, True))
+    arrivals.sort(key=lambda item: item[0])
+    localizer = Localizer(config, room.anchors)
+    for _, sample, again in arrivals:
+        reasons = [item.reason for item in feed(localizer, sample).refusals]
+        assert reasons == (['repeated'] if again else [])
+    assert_equal(reference, localizer)
 
 
 @settings(max_examples=25, deadline=None)

@@ -57,7 +57,7 @@ def test_predict_and_update_equal_filterpy(room):
         walk[TURN_SCALE] = OPEN.turn_scale_walk**2 * 0.03
         walk[GYRO_BIAS] = OPEN.gyro_bias_walk**2 * 0.1
         walk[RANGE_DELAY] = OPEN.range_delay_walk**2 * 0.1
-        walk[RANGE_BIAS:] = OPEN.range_bias_walk**2 * 0.1
+        walk[RANGE_BIAS : RANGE_BIAS + 4] = OPEN.range_bias_walk**2 * 0.1
         reference.Q = np.diag(walk)
         by_input = move(reference.x, motion).by_input
         input_noise(reference.Q, by_input, *OPEN.motion.variances(motion))

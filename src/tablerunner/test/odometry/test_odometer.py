@@ -74,10 +74,10 @@ def test_gyro_turning_while_wheels_stand_is_no_bias():
 
 
 def test_gyro_ramp_is_integrated_exactly():
-    """A yaw rate that grows linearly is integrated without error by the trapezoid."""
+    """Readings that are means since the one before add up to the turn without error."""
     odometer = Odometer(config())
     for k in range(1, 102):
-        odometer.add_imu(ImuSample(k * STEP, 0.01 * (k - 1)))
+        odometer.add_imu(ImuSample(k * STEP, 0.01 * (k - 1.5)))
         last = odometer.add_wheels(WheelSample(k * STEP, 0.1 * k, 0.1 * k))
     assert last.pose.heading == pytest.approx(0.5 * 1.0 * 2.0, abs=1e-9)
 

@@ -171,7 +171,7 @@ class Probe:
         request = SetParameters.Request(
             parameters=[Parameter(name, value=value).to_parameter_msg()]
         )
-        result = self._call(SetParameters, f'{node}/set_parameters', request).results[0]
+        result = self.call(SetParameters, f'{node}/set_parameters', request).results[0]
         return '' if result.successful else result.reason or 'refused without a reason'
 
     def get_parameter(self, node: str, name: str) -> Any:
@@ -181,9 +181,10 @@ class Probe:
         the order.
         """
         request = GetParameters.Request(names=[name])
-        return self._call(GetParameters, f'{node}/get_parameters', request).values[0]
+        return self.call(GetParameters, f'{node}/get_parameters', request).values[0]
 
-    def _call(self, type_: Any, service: str, request: Any) -> Any:
+    def call(self, type_: Any, service: str, request: Any) -> Any:
+        """Return the answer of a service; it may be asked more than once."""
         client = self.node.create_client(type_, service)
         try:
             self.wait_for(client.service_is_ready, f'service {service}')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -18,13 +19,20 @@ def triples_by_area(anchors: Array) -> tuple[Triple, ...]:
 
     Triangles of one area keep the order of their anchors.
     """
+    return _triples_by_area(tuple((float(x), float(y)) for x, y in anchors[:, :2]))
+
+
+@lru_cache(maxsize=16)
+def _triples_by_area(plan: tuple[tuple[float, float], ...]) -> tuple[Triple, ...]:
+    # Anchors stay where they are, and this takes longer than solving a few epochs.
+    places = np.array(plan).reshape(-1, 2)
     found: list[tuple[float, Triple]] = []
-    for triple in combinations(range(len(anchors)), 3):
-        mask = np.zeros((1, len(anchors)), dtype=bool)
+    for triple in combinations(range(len(places)), 3):
+        mask = np.zeros((1, len(places)), dtype=bool)
         mask[0, list(triple)] = True
-        if flatness(anchors, mask)[0][0] < LEAST_FLATNESS:
+        if flatness(places, mask)[0][0] < LEAST_FLATNESS:
             continue
-        (ax, ay), (bx, by), (cx, cy) = anchors[list(triple), :2]
+        (ax, ay), (bx, by), (cx, cy) = places[list(triple)]
         area = 0.5 * abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
         # Rounded, lest the last digit decide between equal triangles.
         found.append((-round(float(area), 6), triple))
