@@ -10,6 +10,7 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from sensor_msgs.msg import MagneticField
 
 from fusion_node.output import EstimateOutput
 from fusion_node.params import FusionNodeConfig
@@ -25,6 +26,7 @@ from tablerunner.types import Refusal
 from tablerunner_interfaces.msg import Innovation as InnovationMessage
 from tablerunner_interfaces.msg import UwbAnchorArray, UwbRange
 from tablerunner_ros.conversions.anchors import anchors_from_message
+from tablerunner_ros.conversions.imu import magnetic_from_message
 from tablerunner_ros.conversions.innovation import innovation_to_message, refusal_to_message
 from tablerunner_ros.conversions.odometry import odometry_from_message
 from tablerunner_ros.conversions.pose import pose_from_message
@@ -36,6 +38,7 @@ from tablerunner_ros.spin import spin_node
 from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
 
 ODOM, RANGES, ANCHORS, START = 'odom', 'uwb/ranges', 'uwb/anchors', 'initialpose'
+MAGNETIC = 'imu/mag'
 FIX = 'uwb/pose'  # also made of ranges inside, for estimators that take positions
 
 _LEVELS = {
@@ -80,13 +83,28 @@ class FusionNode(Node):
         self._subscribe(PoseWithCovarianceStamped, START, partial(self._start, START))
         if config.use_ranges:
             self._diagnostics.watch(RANGES, config.silence)
-            self._subscribe(UwbRange, RANGES, self._on_range)
+            self._listen(UwbRange, RANGES, range_from_message, self._localizer.add_range)
         for topic in config.pose_sources:
-            self._subscribe(PoseWithCovarianceStamped, topic, partial(self._on_pose, topic))
+            convert = partial(pose_from_message, frame=config.map_frame, source=topic)
+            self._listen(PoseWithCovarianceStamped, topic, convert, self._localizer.add_pose)
+        if self._localizer.config.compass.use:
+            self._measured.add(MAGNETIC)
+            convert = partial(magnetic_from_message, mount_heading=config.imu_heading)
+            self._listen(MagneticField, MAGNETIC, convert, self._localizer.add_magnetic)
         FusionServices(self, self._localizer, self._start)
 
     def _subscribe(self, type_: type[Any], topic: str, callback: Callable[[Any], None]) -> None:
         self.create_subscription(type_, topic, callback, qos_for(topic, subscriber=True))
+
+    def _listen(
+        self,
+        type_: type[Any],
+        topic: str,
+        convert: Callable[[Any], Any],
+        take: Callable[[Any], Outcome],
+    ) -> None:
+        """Subscribe to a topic of measurements: convert, one call, publish, count."""
+        self._subscribe(type_, topic, partial(self._on_sample, topic, convert, take))
 
     def _on_odometry(self, message: Odometry) -> None:
         config = self._config
@@ -101,21 +119,19 @@ class FusionNode(Node):
             self._output.transform(outcome.estimate, place, self._localizer.starts)
         self._count(outcome, ODOM, sample.stamp)
 
-    def _on_range(self, message: UwbRange) -> None:
-        sample = range_from_message(message)
-        if self._refused(sample, RANGES):
+    def _on_sample(
+        self,
+        source: str,
+        convert: Callable[[Any], Any],
+        take: Callable[[Any], Outcome],
+        message: Any,
+    ) -> None:
+        sample = convert(message)
+        if self._refused(sample, source):
             return
-        outcome = self._localizer.add_range(sample)
+        outcome = take(sample)
         self._publish(outcome)
-        self._count(outcome, RANGES, sample.stamp)
-
-    def _on_pose(self, topic: str, message: PoseWithCovarianceStamped) -> None:
-        sample = pose_from_message(message, self._config.map_frame, topic)
-        if self._refused(sample, topic):
-            return
-        outcome = self._localizer.add_pose(sample)
-        self._publish(outcome)
-        self._count(outcome, topic, sample.stamp)
+        self._count(outcome, source, sample.stamp)
 
     def _start(self, source: str, message: PoseWithCovarianceStamped) -> str:
         """Begin anew at a pose that a user gives; return why not, or nothing."""

@@ -26,6 +26,13 @@ class FusionNodeConfig(Config):
         choices=('camera/pose', 'uwb/pose'),
     )
     use_ranges: bool = parameter(True, description='Whether uwb/ranges is fused')
+    imu_heading: float = parameter(
+        0.0,
+        unit='rad',
+        description="Heading of the magnetometer's frame in base_link",
+        low=-3.15,
+        high=3.15,
+    )
     silence: float = parameter(
         1.0,
         unit='s',

@@ -12,14 +12,16 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.parameter import Parameter
+from sensor_msgs.msg import MagneticField
 
 from fusion_node.node import FusionNode
 from fusion_node.testing import ANCHORS, START, Fusion
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
-from tablerunner.types import OdometrySample, PoseSample
+from tablerunner.types import MagneticSample, OdometrySample, PoseSample
 from tablerunner_interfaces.msg import UwbAnchorArray
 from tablerunner_ros.conversions.anchors import anchors_to_message
+from tablerunner_ros.conversions.imu import magnetic_to_message
 from tablerunner_ros.conversions.odometry import odometry_from_message, odometry_to_message
 from tablerunner_ros.conversions.pose import pose_from_message, pose_to_message
 from tablerunner_ros.conversions.quaternion import heading_from_quaternion
@@ -284,6 +286,25 @@ def test_fusion_bad_parameter_is_named(
     given = [Parameter(name, value=value) for name, value in parameters.items()]
     with pytest.raises(ConfigError, match=re.escape(f'parameters of /fusion_node: {words}')):
         FusionNode(context=probe.context, parameter_overrides=given)
+
+
+def test_fusion_compass_is_heard_where_the_field_is_the_earths(probe: Probe) -> None:
+    """A heading from imu/mag narrows the estimate's; a field bent by iron is refused by name."""
+    robot = Fusion(probe, compass__use=True, compass__north=0.5, initial_pose_std=[0.1, 0.1, 0.3])
+    probe.speak(MagneticField, 'imu/mag')
+    probe.connected('imu/mag')
+    robot.drive(0.5, 0.0, 3)
+    probe.wait_for(lambda: robot.poses, 'a pose')
+    for horizontal, reason in ((20e-6, ''), (40e-6, 'field not plausible')):
+        told = len(robot.innovations)
+        angle = 0.5 - START.heading
+        field = (horizontal * math.cos(angle), horizontal * math.sin(angle), -44e-6)
+        sample = MagneticSample(robot.stamp, *field)
+        probe.publish('imu/mag', magnetic_to_message(sample, 'imu_link'))
+        probe.wait_for(lambda told=told: len(robot.innovations) > told, 'an innovation')
+        last = robot.innovations[-1]
+        assert (last.source, last.accepted, last.reason) == ('imu/mag', not reason, reason)
+    assert robot.poses[-1].pose.covariance[35] < 0.012  # 0.09 before, the heading's 0.01 beside it
 
 
 def test_fusion_bad_parameter_file_exits_2_with_one_sentence(processes: Processes) -> None:

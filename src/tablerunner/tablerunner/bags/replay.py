@@ -19,6 +19,7 @@ from tablerunner.estimation.recording import RecordingLocalizer, Run
 from tablerunner.evaluation.consistency import SourceSummary, summarize_innovations
 from tablerunner.evaluation.errors import ErrorSeries, compare
 from tablerunner.evaluation.truth import Stamps, Truth
+from tablerunner.messages.imu import MAGNETIC_SOURCE
 from tablerunner.messages.truth import TruePose
 from tablerunner.odometry import Odometer
 from tablerunner.types import (
@@ -27,6 +28,7 @@ from tablerunner.types import (
     ExchangeSample,
     ImuSample,
     Innovation,
+    MagneticSample,
     Matrix,
     OdometrySample,
     PoseSample,
@@ -225,6 +227,7 @@ class _Replay:
             'uwb/exchanges': self._take_exchange,
             'uwb/ranges': self._take_range,
             'camera/pose': self._take_pose,
+            MAGNETIC_SOURCE: self._take_magnetic,
             'initialpose': self._take_initial_pose,
         }
 
@@ -242,6 +245,8 @@ class _Replay:
                 'to replay'
             )
         topics.append(ranges if present(ranges) else 'uwb/ranges')
+        if self._config.localizer.compass.use:
+            topics.append(MAGNETIC_SOURCE)
         topics += ['camera/pose', 'initialpose', TRUTH]
         return tuple(topic for topic in topics if present(topic))
 
@@ -298,6 +303,9 @@ class _Replay:
 
     def _take_pose(self, sample: PoseSample) -> None:
         self._note(self._localizer.add_pose(sample))
+
+    def _take_magnetic(self, sample: MagneticSample) -> None:
+        self._note(self._localizer.add_magnetic(sample))
 
     def _take_initial_pose(self, sample: PoseSample) -> None:
         self._note(self._localizer.set_pose(sample))

@@ -204,7 +204,10 @@ def fused_of(drive: Drive, name: str) -> tuple[NDArray[np.int64], Array]:
         initial_pose_std=(0.05, 0.05, 0.02),
         positioner=PositionerConfig(solver='two_anchor', epoch=0.5),
         filter=EstimatorConfig(
-            range_bias_common_std=0.003, range_bias_std=0.003, range_bias_walk=1e-4
+            range_bias_common_std=0.003,
+            range_bias_std=0.003,
+            range_bias_walk=1e-4,
+            range_scale_std=0.0005,
         ),
     )
     nlos_test = 'signal_quality' if name == 'ekf' else PAPER_NLOS_TEST

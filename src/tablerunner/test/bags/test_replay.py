@@ -138,6 +138,18 @@ def test_replay_start_given_is_trusted_at_once(
     assert result.errors.distances[0] < 0.05
 
 
+def test_replay_takes_the_compass_only_when_asked(
+    simulated_bag: Path, config: ReplayConfig, first: ReplayResult
+) -> None:
+    """Fields that are plausible become headings; the others are refused with a reason."""
+    assert 'imu/mag' not in first.by_source()
+    compass = config.localizer.compass.replace(use=True, north=np.pi / 2)
+    asked = changed(config, localizer=changed(config.localizer, compass=compass))
+    result = run(simulated_bag, asked)
+    assert result.by_source()['imu/mag'].accepted > 0.5
+    assert set(result.refusals) >= {('imu/mag', 'start not known yet')}
+
+
 def test_replay_dead_reckoning_accepts_no_range(
     simulated_bag: Path, config: ReplayConfig, restaurant: Scenario
 ) -> None:
