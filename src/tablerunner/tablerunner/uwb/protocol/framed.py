@@ -23,10 +23,12 @@ class Fault(NamedTuple):
 class FramedParser(Parser):
     """Base of the parsers of binary frames.
 
-    A frame is at most `longest` bytes long: no more than that is ever kept.
+    A frame is at most `longest` bytes long: no more than that is ever kept. One of less than
+    `telling` bytes comes up by chance, and says nothing against a frame that is waited for.
     """
 
     longest = 0
+    telling = 0
 
     def __init__(self, max_range_m: float = MAX_RANGE_M) -> None:
         super().__init__(max_range_m)
@@ -58,6 +60,9 @@ class FramedParser(Parser):
             if length < 0 or start + length > len(buffer):
                 if waiting < 0:
                     waiting = start
+                at = start + 1
+                continue
+            if waiting >= 0 and length < self.telling:
                 at = start + 1
                 continue
             fault = self._fault(buffer, start, length)
