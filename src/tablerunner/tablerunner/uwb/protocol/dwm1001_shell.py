@@ -22,7 +22,7 @@ MAX_RESIDUAL_M = 3.0
 MOST_ANCHORS = 15
 
 NEW_SET = 'anchors not seen together before'
-"""Why the first line of `les` with these anchors is refused."""
+"""Why the first line with these anchors is refused, where it may have lost something."""
 
 _MOST_SETS = 256
 
@@ -33,7 +33,7 @@ _HEAD = re.compile(rb'DIST,(\d{1,2})')
 _GROUP = re.compile(rb',AN(\d{1,2}),([0-9A-F]{4}),' + _THREE + rb',' + _RANGE)
 _END = re.compile(rb'(?:,POS,' + _THREE + rb',(\d{1,3}))?\Z')
 _WORD = re.compile(rb'([0-9A-F]{4})\[' + _THREE + rb'\]=' + _RANGE + rb'(?: |\Z)')
-_REST = re.compile(rb'(?:le_us=\d+(?: |\Z))?(?:est\[' + _THREE + rb',(\d{1,3})\])?\Z')
+_REST = re.compile(rb'(?:le_us=\d+(?: est\[' + _THREE + rb',(\d{1,3})\])?)?\Z')
 _POSITION = re.compile(rb'POS,' + _THREE + rb',(\d{1,3})\Z')
 _MEASURED = re.compile(rb'DIST|POS|,AN\d|\]=|est\[|le_us')
 _TEXT = re.compile(rb'[\x20-\x7e\t]*\Z')
@@ -44,8 +44,9 @@ class Dwm1001Shell(Parser):
     """Reads the lines of `lec`, `les` and `lep`; other text of the shell is passed over.
 
     A line of `les` does not tell how many anchors it has: what is lost between two of them gives
-    one anchor the range of another. So the first line with a set of anchors is refused, and the
-    next ones are believed. `lec` counts its anchors.
+    one anchor the range of another. A line without a position may have lost it, from within the
+    last range on. So the first such line with a set of anchors is refused, and the next ones are
+    believed. `lec` counts its anchors, and its lines with a position are believed at once.
 
     Parameters
     ----------
@@ -65,7 +66,8 @@ class Dwm1001Shell(Parser):
         self._max_residual_m = max_residual_m
         self._buffer = b''
         self._skipping = False  # inside a line that is too long to be one
-        self._sets: set[frozenset[str]] = set()  # anchors that came together in lines of `les`
+        # Anchors that came together in lines that may have lost something, with a position or not.
+        self._sets: set[tuple[bool, frozenset[str]]] = set()
 
     @property
     def buffered(self) -> int:
@@ -125,7 +127,7 @@ class Dwm1001Shell(Parser):
         if end is None or len(found) != count:
             self._refuse('damaged line', 'POS' if len(found) == count else f'AN{len(found)}')
             return
-        self._finish(found, end.groups())
+        self._finish(found, end.groups(), counted=True)
 
     def _les(self, line: bytes) -> None:
         found: list[DeviceRange] = []
@@ -137,21 +139,14 @@ class Dwm1001Shell(Parser):
         if rest is None:
             self._refuse('damaged line', f'anchor {len(found)}')
             return
-        anchors = frozenset(item.anchor for item in found)
-        if anchors not in self._sets:
-            if len(self._sets) == _MOST_SETS:
-                self._sets.clear()
-            self._sets.add(anchors)
-            self._refuse(NEW_SET)
-            return
-        self._finish(found, rest.groups())
+        self._finish(found, rest.groups(), counted=False)
 
     def _lep(self, line: bytes) -> None:
         match = _POSITION.match(line)
         if match is None:
             self._refuse('damaged line', 'POS')
             return
-        self._finish([], match.groups())
+        self._finish([], match.groups(), counted=True)
 
     def _range(self, texts: tuple[bytes, ...]) -> DeviceRange:
         address, x, y, z, distance = texts
@@ -163,7 +158,9 @@ class Dwm1001Shell(Parser):
             anchor_place=(float(x), float(y), float(z)),
         )
 
-    def _finish(self, found: list[DeviceRange], position: tuple[bytes | None, ...]) -> None:
+    def _finish(
+        self, found: list[DeviceRange], position: tuple[bytes | None, ...], counted: bool
+    ) -> None:
         if len(found) > MOST_ANCHORS:
             self._refuse('too many anchors')
             return
@@ -178,6 +175,9 @@ class Dwm1001Shell(Parser):
             if quality > 100:
                 self._refuse('damaged line', 'quality')
                 return
+        if (not counted or place is None) and not self._familiar(found, place is not None):
+            self._refuse(NEW_SET)
+            return
         odd = odd_one(found, place, self._max_residual_m) if place and quality else -1
         self._frames += 1
         for index, item in enumerate(found):
@@ -187,3 +187,13 @@ class Dwm1001Shell(Parser):
                 self._give(item)
         if place is not None:
             self._give(DevicePosition(self._stamp, '', place, quality / 100.0))
+
+    def _familiar(self, found: list[DeviceRange], placed: bool) -> bool:
+        """Return whether such a line came before, and remember it."""
+        kind = (placed, frozenset(item.anchor for item in found))
+        if kind in self._sets:
+            return True
+        if len(self._sets) == _MOST_SETS:
+            self._sets.clear()
+        self._sets.add(kind)
+        return False

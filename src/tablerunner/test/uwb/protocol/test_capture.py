@@ -78,7 +78,7 @@ def test_datagrams_keep_their_borders_and_refusals_come_through():
 
 
 def test_long_read_is_split_and_comes_back_whole():
-    line = lec_line([(1, (0.0, 0.0, 0.0), 1.0)])
+    line = lec_line([(1, (0.0, 0.0, 0.0), 1.0)], (0.0, 0.0, 1.0))
     stream = line * (200_000 // len(line))
     parser = replay()
     parsed = parser.feed(capture_header('dwm1001', 1) + capture_chunk(7, stream), 0)
