@@ -54,7 +54,8 @@ class Parsed(NamedTuple):
     """What came out of some bytes.
 
     The `key` of a refusal is the anchor whose range was refused, or the part of the frame that
-    was damaged (``checksum``, ``node 2``, ``AN1``); it may be empty.
+    was damaged (``checksum``, ``node 2``) or from which on it could not be read (``AN1``); it may
+    be empty.
     """
 
     records: tuple[Record, ...] = ()

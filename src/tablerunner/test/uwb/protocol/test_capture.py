@@ -121,17 +121,17 @@ def test_unknown_protocol_and_missing_header_are_refused():
         'no protocol is known to read this'
     ]
     refusals = parser.feed(capture_header('other', 1) + capture_chunk(1, b'x'), 0).refusals
-    assert [(item.reason, item.key) for item in refusals] == [
-        ('unknown protocol', 'other'),
-        ('no protocol is known to read this', 'other'),
+    assert [(item.reason, item.key, item.stamp) for item in refusals] == [
+        ('unknown protocol', 'other', 1),
+        ('no protocol is known to read this', 'other', 1),
     ]
     with pytest.raises(ValueError, match='1 to 64 bytes'):
         capture_header('', 1)
 
 
 def test_lost_chunk_does_not_join_what_was_apart():
-    """Half a frame before the lost chunk and half of another behind it make no frame."""
-    first, second = node_frame3(NODES), node_frame3(NODES, system_time=2)
+    """Half a frame before the lost chunk and the half behind it, which would fit, make none."""
+    first = second = node_frame3(NODES)
     lost = bytearray(capture_chunk(2, first[20:] + second[:20]))
     lost[-1] ^= 1
     file = capture_header('linktrack', 1) + capture_chunk(1, first[:20]) + bytes(lost)

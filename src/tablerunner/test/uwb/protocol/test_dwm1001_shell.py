@@ -187,3 +187,20 @@ def test_line_without_end_is_dropped_and_counted_once():
     assert parser.counts == {'line too long': 1}
     found = parser.feed(b'\n' + lec_line(ANCHORS, PLACE), 2).records
     assert ranges(found) == expected(ANCHORS)
+
+
+@pytest.mark.parametrize(
+    ('change', 'expected'),
+    [
+        ((b',AN2,', b',AN3,'), ('damaged line', 'AN2')),
+        ((b'9280', b'022E'), ('anchor named twice', '')),
+        ((b'DIST,4', b'DIST,5'), ('damaged line', 'AN4')),
+        ((b'-1.97,60', b'-1.97,101'), ('damaged line', 'quality')),
+        ((b'5.68', b'5.680'), ('damaged line', 'AN2')),  # where it could not be read on
+        ((b'DIST', b'DI\xd3T'), ('line is no text', '')),
+    ],
+)
+def test_line_with_one_fault_is_refused_by_its_part(change, expected):
+    parsed = Dwm1001Shell().feed(lec_line(ANCHORS, PLACE).replace(*change), 1)
+    assert [(item.reason, item.key) for item in parsed.refusals][:1] == [expected]
+    assert not parsed.records

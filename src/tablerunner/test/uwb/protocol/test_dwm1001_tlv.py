@@ -169,3 +169,49 @@ def test_truncated_answer_is_refused_when_the_next_begins():
     parsed = Dwm1001Tlv().feed(good[:60] + good, 1)
     assert ranges(parsed.records) == TRUE
     assert [item.reason for item in parsed.refusals] == ['truncated frame']
+
+
+@pytest.mark.parametrize(
+    ('anchor', 'reason'),
+    [
+        ((1, 1000, 101, (0, 0, 0)), 'impossible distance'),
+        ((1, 10_000_001, 100, (0, 0, 0)), 'impossible distance'),
+        ((1, 1000, 100, (0, -10_000_001, 0)), 'impossible place of an anchor'),
+        (ANCHORS[0], 'anchor named twice'),
+    ],
+)
+def test_list_with_one_impossible_entry_is_refused_whole(anchor, reason):
+    parsed = Dwm1001Tlv().feed(location_answer([*ANCHORS, anchor], PLACE), 1)
+    assert [(item.reason, item.key) for item in parsed.refusals] == [(reason, 'entry 4')]
+    assert not parsed.ranges
+
+
+def test_impossible_quality_of_an_anchors_place_is_refused():
+    answer = bytearray(location_answer(ANCHORS, PLACE))
+    answer[-1] = 101
+    parsed = Dwm1001Tlv().feed(bytes(answer), 1)
+    assert [item.key for item in parsed.refusals] == ['entry 3']
+    assert not parsed.ranges
+
+
+def test_impossible_position_and_the_list_behind_it_are_refused():
+    for place, quality in [((0, 0, 10_000_001), 50), (PLACE, 101)]:
+        parsed = Dwm1001Tlv().feed(location_answer(ANCHORS, place, quality), 1)
+        assert not parsed.records
+        assert parsed.refusals[0].reason == 'impossible position'
+
+
+def test_list_after_a_reset_belongs_to_no_answer():
+    parser = Dwm1001Tlv()
+    answer = location_answer(ANCHORS, PLACE)
+    assert parser.feed(answer[:18], 1).records
+    parser.reset()
+    assert not parser.feed(answer[18:], 2).records
+
+
+def test_range_that_alone_does_not_fit_the_position_is_refused():
+    anchors = [*ANCHORS[:3], (*ANCHORS[3][:1], 9000, *ANCHORS[3][2:])]
+    parsed = Dwm1001Tlv().feed(location_answer(anchors, PLACE), 1)
+    assert ranges(parsed.records) == TRUE[:3]
+    assert [item.key for item in parsed.refusals] == ['5431']
+    assert len(Dwm1001Tlv(max_residual_m=0.0).feed(location_answer(anchors, PLACE), 1).ranges) == 4

@@ -162,3 +162,18 @@ def test_reset_forgets_half_a_frame_and_keeps_the_counts():
     assert len(parser.feed(node_frame3(NODES), 2).ranges) == 3
     assert parser.counts == {'bytes that are no frame': 1}
     assert parser.frames == 1
+
+
+@pytest.mark.parametrize(
+    ('nodes', 'role', 'expected'),
+    [
+        (NODES, 9, ('unknown role', 'header')),
+        ([NODES[0], (7, 1, 1000, -80, -80)], 2, ('unknown role', 'node 1')),
+        ([*NODES, NODES[1]], 2, ('node named twice', 'node 3')),
+    ],
+)
+def test_frame_whose_sum_is_right_and_sense_is_not_is_refused(nodes, role, expected):
+    """What damage to several bytes may leave."""
+    parsed = LinkTrack().feed(node_frame3(nodes, role=role), 1)
+    assert [(item.reason, item.key) for item in parsed.refusals] == [expected]
+    assert not parsed.records
