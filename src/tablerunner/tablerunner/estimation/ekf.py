@@ -37,7 +37,12 @@ from tablerunner.estimation.estimator import (
 )
 from tablerunner.estimation.models.motion_model import input_noise, move, transport
 from tablerunner.estimation.models.position_model import predict_position
-from tablerunner.estimation.models.range_model import STANDING, Point3, predict_range
+from tablerunner.estimation.models.range_model import (
+    STANDING,
+    Point3,
+    predict_range,
+    predict_ranges,
+)
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
     HEADING,
@@ -212,16 +217,18 @@ class Ekf:
     ) -> tuple[Estimate, tuple[Innovation, ...]] | None:
         """Return what `update_ranges` does if no range is out of the ordinary, else None."""
         config, memory = self.config, list(estimate.memory)
-        slopes = np.empty((len(samples), self._size))
-        innovations = []
-        noises = []
-        for row, sample in enumerate(samples):
-            index, anchor = self._anchors[sample.anchor_id]
-            expected, slopes[row] = predict_range(
-                estimate.mean, anchor.position, self.lever_arm, index, estimate.twist
-            )
-            innovations.append(sample.range_m - anchor.bias_m - expected)
-            noises.append(range_variance(config, sample))
+        anchors = [self._anchors[sample.anchor_id] for sample in samples]
+        expected, slopes = predict_ranges(
+            estimate.mean,
+            [(anchor.position, index) for index, anchor in anchors],
+            self.lever_arm,
+            estimate.twist,
+        )
+        innovations = [
+            sample.range_m - anchor.bias_m - value
+            for sample, (_, anchor), value in zip(samples, anchors, expected, strict=True)
+        ]
+        noises = [range_variance(config, sample) for sample in samples]
         cross = estimate.covariance.dot(slopes.T)
         spread = slopes.dot(cross)
         spread.reshape(-1)[:: len(samples) + 1] += noises
@@ -239,9 +246,9 @@ class Ekf:
         variances = (scales * scales).reshape(-1, 1)
         found = []
         for row, (sample, deviation) in enumerate(zip(samples, deviations, strict=True)):
-            index = self._anchors[sample.anchor_id][0]
+            index = anchors[row][0]
             persistent = memory[index]
-            if persistent > config.persistence:
+            if not -config.doubt < persistent < config.persistence:
                 return None
             memory[index] = persistent + config.persistence_share * (deviation - persistent)
             found.append(

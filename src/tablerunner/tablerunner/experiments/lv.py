@@ -1,4 +1,4 @@
-"""Lv and Jiang's UWB test: triangle centroid against twice triangle centroid (table V).
+"""Lv and Jiang: triangle centroid against twice triangle centroid (table V), and their drives.
 
 Ten points in a room of 10 m x 10 m, four anchors in the corners, 4 m high. A range reads too long
 by a half-normal error, as from walls and people, and has normal noise on top; one factor scales
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tablerunner.experiments.experiment import Bound, Outcome, Progress, Row, Spread
+from tablerunner.experiments.lv_trajectories import run_trajectories
 from tablerunner.experiments.seeds import run_seeds
 from tablerunner.uwb.range_calibration import fit_calibration
 from tablerunner.uwb.solvers.registry import solve
@@ -53,6 +54,28 @@ class LvRun:
 
 
 def run_lv(seeds: Sequence[int], progress: Progress) -> Outcome:
+    """Run table V and the drives of figures 10 and 11 for many seeds."""
+    table = run_table(seeds, lambda done, count: progress(done, 2 * count))
+    drives = run_trajectories(seeds, lambda done, count: progress(count + done, 2 * count))
+
+    def draw_both(figure: Any) -> None:
+        figure.set_size_inches(9.0, 11.0)
+        upper, lower = figure.subfigures(2, 1, height_ratios=(4.5, 6.5))
+        table.draw(upper)
+        drives.draw(lower)
+
+    return Outcome(
+        'lv',
+        'Lv and Jiang: UWB positioning at ten points (table V), trajectories (figures 10, 11)',
+        tuple(seeds),
+        (*table.rows, *drives.rows),
+        draw_both,
+        {**table.settings, **drives.settings},
+        (*table.notes, *drives.notes),
+    )
+
+
+def run_table(seeds: Sequence[int], progress: Progress) -> Outcome:
     """Run table V for many seeds."""
     factor = matched_factor()
     runs = run_seeds(partial(one_run, factor=factor), seeds, progress)

@@ -8,7 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tablerunner.estimation.models.motion_model import input_noise, move, move_many, transport
-from tablerunner.estimation.models.range_model import predict_range, predict_range_many
+from tablerunner.estimation.models.range_model import (
+    predict_range,
+    predict_range_many,
+    predict_ranges,
+)
 from tablerunner.estimation.models.state import HEADING, RANGE_BIAS, RANGE_DELAY
 from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
@@ -117,6 +121,18 @@ def test_predict_range_many_equals_predict_range(mean, twist):
     many = predict_range_many(np.array([mean, mean + 0.01]), anchor, arm, 1, twist)
     for value, alone in zip(many, (mean, mean + 0.01), strict=True):
         assert value == pytest.approx(predict_range(alone, anchor, arm, 1, twist)[0], abs=1e-12)
+
+
+@given(STATES, TWISTS)
+def test_predict_ranges_are_each_predict_range(mean, twist):
+    """Several anchors at one instant: the same values and rows, to the last bit."""
+    arm = (0.2, -0.1, 1.1)
+    anchors = [((13.0, 4.0, 2.25), 1), ((-3.0, 8.0, 2.0), 0)]
+    expected, jacobian = predict_ranges(mean, anchors, arm, twist)
+    for value, row, (anchor, index) in zip(expected, jacobian, anchors, strict=True):
+        alone, slope = predict_range(mean, anchor, arm, index, twist)
+        assert value == alone
+        assert np.array_equal(row, slope)
 
 
 def test_predict_range_of_late_stamps_is_where_the_robot_was():

@@ -45,7 +45,7 @@ CLEAR = clear_of(ROOM)
 def comparison_of(scenario=CLEAR, factor=1.0, seeds=SEEDS, estimators=('ekf',)):
     """Return the comparison with the matched process noise times a factor."""
     setup = Setup(scenario, ROUTE, estimators)
-    config = matched(scenario, setup.way)
+    config = matched(scenario, setup.speed)
     fitted = config.localizer.filter
     motion = replace(
         fitted.motion,

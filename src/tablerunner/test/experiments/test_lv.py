@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from tablerunner.experiments.lv import POINTS, distances, matched_factor, one_run, run_lv
+from tablerunner.experiments.lv import POINTS, distances, matched_factor, one_run, run_table
 
 SEEDS = range(100, 106)  # none that the docs show
 
 
 @pytest.fixture(scope='module')
 def outcome():
-    return run_lv(SEEDS, lambda done, count: None)
+    return run_table(SEEDS, lambda done, count: None)
 
 
 def test_raw_row_is_matched_and_the_bounds_hold(outcome):

@@ -9,6 +9,8 @@ well above the tag.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,11 +59,58 @@ def predict_range(
         d(range)/d(state); units 1, 1, m/rad, 0 ... m/s, 0 ... 1, 0 ... m. Zero towards an anchor
         that the tag touches.
     """
+    jacobian = np.zeros(len(mean))
+    tag = _tag(mean, lever_arm, twist)
+    return _range(mean, tag, anchor, bias_index, jacobian), jacobian
+
+
+def predict_ranges(
+    mean: Vector,
+    anchors: Sequence[tuple[Point3, int]],
+    lever_arm: Point3,
+    twist: Twist = STANDING,
+) -> tuple[list[float], Matrix]:
+    """Return the ranges that several anchors should read at one instant, and their Jacobian.
+
+    Parameters
+    ----------
+    mean, lever_arm, twist
+        As for `predict_range`.
+    anchors : sequence of (anchor, bias_index)
+        As for `predict_range`, m of them.
+
+    Returns
+    -------
+    expected : list of float
+    jacobian : ndarray, shape (m, n)
+    """
+    jacobian = np.zeros((len(anchors), len(mean)))
+    tag = _tag(mean, lever_arm, twist)
+    expected = [
+        _range(mean, tag, anchor, index, row)
+        for (anchor, index), row in zip(anchors, jacobian, strict=True)
+    ]
+    return expected, jacobian
+
+
+class _Tag(NamedTuple):
+    """Where the tag was when the range was taken, seen from the base and in map."""
+
+    x: float
+    y: float
+    z: float
+    from_base_x: float
+    from_base_y: float
+    by_delay_x: float  # d(x)/d(delay) [m/s]
+    by_delay_y: float
+
+
+def _tag(mean: Vector, lever_arm: Point3, twist: Twist) -> _Tag:
     # Plain floats: this runs for every range, and reading an array element costs ten times more.
     x, y, heading, _, _, _, delay = mean[:RANGE_BIAS].tolist()
     speed, turn_rate = twist
     cos, sin = math.cos(heading), math.sin(heading)
-    # The tag, seen from the base now: where it was a delay ago. Along and across the heading.
+    # Along and across the heading.
     arm_x, arm_y, arm_z = lever_arm
     if delay and turn_rate:
         angle = -turn_rate * delay
@@ -69,25 +118,35 @@ def predict_range(
         arm_x, arm_y = turned * arm_x - across * arm_y, across * arm_x + turned * arm_y
     ahead = arm_x - speed * delay
     tag_x, tag_y = cos * ahead - sin * arm_y, sin * ahead + cos * arm_y
-    dx, dy, dz = x + tag_x - anchor[0], y + tag_y - anchor[1], arm_z - anchor[2]
+    # The tag moves with the base and round it; a delay takes it back.
+    along, aside = speed - turn_rate * arm_y, turn_rate * arm_x
+    return _Tag(
+        x + tag_x,
+        y + tag_y,
+        arm_z,
+        tag_x,
+        tag_y,
+        sin * aside - cos * along,
+        -sin * along - cos * aside,
+    )
+
+
+def _range(mean: Vector, tag: _Tag, anchor: Point3, index: int, jacobian: Vector) -> float:
+    """Return the expected range; fill the Jacobian, which is zero before."""
+    tag_x, tag_y, tag_z, from_base_x, from_base_y, by_delay_x, by_delay_y = tag
+    dx, dy, dz = tag_x - anchor[0], tag_y - anchor[1], tag_z - anchor[2]
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-    size = len(mean)
-    jacobian = np.zeros(size)
-    row = range_scale(size) + bias_index
-    grown = 1.0 + float(mean[row])
+    bias, scale = RANGE_BIAS + index, range_scale(len(mean)) + index
+    grown = 1.0 + float(mean[scale])
     if distance > NEAREST_M:
         ux, uy = grown * dx / distance, grown * dy / distance
         jacobian[X] = ux
         jacobian[Y] = uy
-        jacobian[HEADING] = uy * tag_x - ux * tag_y
-        # The tag moves with the base and round it; a delay takes it back.
-        along, aside = speed - turn_rate * arm_y, turn_rate * arm_x
-        jacobian[RANGE_DELAY] = -(
-            ux * (cos * along - sin * aside) + uy * (sin * along + cos * aside)
-        )
-    jacobian[RANGE_BIAS + bias_index] = 1.0
-    jacobian[row] = distance
-    return grown * distance + float(mean[RANGE_BIAS + bias_index]), jacobian
+        jacobian[HEADING] = uy * from_base_x - ux * from_base_y
+        jacobian[RANGE_DELAY] = ux * by_delay_x + uy * by_delay_y
+    jacobian[bias] = 1.0
+    jacobian[scale] = distance
+    return grown * distance + float(mean[bias])
 
 
 def predict_range_many(

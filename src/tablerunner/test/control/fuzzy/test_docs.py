@@ -10,7 +10,9 @@ import pytest
 
 from tablerunner.cli import main as cli
 from tablerunner.config import Config, Document, parameters_of
+from tablerunner.control.contour import ContourConfig
 from tablerunner.control.fuzzy import ReactiveConfig, TrackConfig, read_base
+from tablerunner.control.fuzzy_controller import DetourConfig
 
 PAGE = Path(__file__).parents[5] / 'docs' / 'fuzzy.md'
 
@@ -22,7 +24,13 @@ def part(name: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ('cls', 'prefix'), [(ReactiveConfig, 'reactive.'), (TrackConfig, 'track.')]
+    ('cls', 'prefix'),
+    [
+        (ReactiveConfig, 'reactive.'),
+        (TrackConfig, 'track.'),
+        (ContourConfig, 'contour.'),
+        (DetourConfig, 'detour.'),
+    ],
 )
 def test_parameter_table_is_that_of_the_code(cls: type[Config], prefix: str) -> None:
     rows = []

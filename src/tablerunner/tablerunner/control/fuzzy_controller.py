@@ -1,0 +1,223 @@
+"""The fuzzy path controller: Sun's track keeping, and Lv's way round what is not on the map.
+
+Behind the same protocol as `PurePursuit`; besides, it has to be told what the ultrasonic sensors
+hear. docs/fuzzy.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablerunner.config import Config, parameter
+from tablerunner.control.contour import ContourConfig, ContourNavigator, Mode
+from tablerunner.control.controller import Drive
+from tablerunner.control.follower import FollowerConfig
+from tablerunner.control.fuzzy.reactive import ReactiveConfig, ReactiveController
+from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.fuzzy.track_keeper import TrackConfig, TrackKeeper
+from tablerunner.control.limits import VelocityLimits
+from tablerunner.control.path import Path
+from tablerunner.geometry.angles import difference
+from tablerunner.geometry.pose import Pose2
+from tablerunner.types import Velocity
+
+_HALF_CONE_RAD = 0.24
+_BACK_M, _ON_M = 0.3, 1.0  # progress along the path in one step
+_ENOUGH = 3  # steps in a row in which something is in the way
+_LAST_M = 0.3  # from here on straight to the end
+
+
+@dataclass(frozen=True)
+class DetourConfig(Config):
+    """When the path is left for what stands in it, and where it is taken up again."""
+
+    notice: float = parameter(
+        0.8, description='Something in the path is heard so near', unit='m', above=0.0
+    )
+    half_width: float = parameter(
+        0.3, description='In the path is what is so near its middle', unit='m', above=0.0
+    )
+    rejoin: float = parameter(
+        2.5, description='The way round leads to the path so far ahead', unit='m', above=0.0
+    )
+
+
+class FuzzyController:
+    """Keeps to a path, goes round what stands in it by its contour, and rejoins the path.
+
+    Deterministic. Where there is no way round it stands, `blocked_by` says why, and the mission's
+    watch over progress has the last word.
+
+    Parameters
+    ----------
+    limits : VelocityLimits
+        Speeds, turn rates and accelerations that are always kept.
+    mounts : tuple of Pose2
+        Poses of the five ultrasonic sensors in base_link, in the order of `SENSORS`.
+    track_m : float
+        Distance between the wheels.
+    ends : FollowerConfig
+        How a path ends: tolerances, braking, turning on the spot.
+    """
+
+    def __init__(
+        self,
+        limits: VelocityLimits,
+        mounts: tuple[Pose2, ...],
+        track_m: float,
+        ends: FollowerConfig | None = None,
+        detour: DetourConfig | None = None,
+        track: TrackConfig | None = None,
+        reactive: ReactiveConfig | None = None,
+        contour: ContourConfig | None = None,
+    ) -> None:
+        self.limits = limits
+        self.ends = ends or FollowerConfig()
+        self.detour = detour or DetourConfig()
+        self._mounts = mounts
+        self._keeper = TrackKeeper(track or TrackConfig(), track_m)
+        self._navigator = ContourNavigator(
+            contour or ContourConfig(),
+            ReactiveController(reactive or ReactiveConfig(), limits),
+            mounts,
+        )
+        self._path: Path | None = None
+        self._readings: Readings | None = None
+        self._velocity = Velocity()
+        self._begin()
+
+    def _begin(self) -> None:
+        self._arc = 0.0
+        self._at_end = False
+        self._around = False
+        self._seen = 0
+        self.blocked_by = ''
+
+    def hear(self, readings: Readings) -> None:
+        """Take what the sensors hear now; counts for the next step only."""
+        self._readings = readings
+
+    def follow(self, path: Path) -> None:
+        """Take a new path; the velocity carries on from the last one."""
+        self._path = path
+        self._begin()
+        if len(path.points) > 1:
+            self._keeper.follow(path)
+
+    def halt(self, dt: float) -> Velocity:
+        """Return the next velocity of coming to a stand."""
+        self._velocity = self.limits.approach(self._velocity, Velocity(), dt)
+        return self._velocity
+
+    def step(self, pose: Pose2, dt: float) -> Drive:
+        """Return the velocity for a robot at `pose` (base_link in map), `dt` [s] after the last.
+
+        Raises
+        ------
+        ValueError
+            No path was given, or the pose is not finite.
+        """
+        path = self._path
+        if path is None:
+            raise ValueError('there is no path to follow')
+        if not pose.is_finite:
+            raise ValueError('the pose is not finite')
+        readings, self._readings = self._readings, None
+        end_x, end_y = path.end
+        to_end = math.hypot(end_x - pose.x, end_y - pose.y)
+        # On the way round the robot may be far ahead on the path already.
+        on = self.detour.rejoin + _ON_M if self._around else _ON_M
+        self._arc, off = path.project(pose.x, pose.y, self._arc - _BACK_M, self._arc + on)
+        left = max(path.length - self._arc, to_end)
+        wanted, arrived = self._at_the_end(pose, path, left, to_end)
+        if wanted is None:
+            wanted = self._on_the_way(pose, path, readings, dt, off, left)
+        self._velocity = self.limits.approach(self._velocity, wanted, dt)
+        return Drive(self._velocity, left, off, arrived)
+
+    def _at_the_end(
+        self, pose: Pose2, path: Path, left: float, to_end: float
+    ) -> tuple[Velocity | None, bool]:
+        """Return what to do within the position tolerance (None: not there yet), and arrival."""
+        tolerance = self.ends.position_tolerance
+        # Turning shifts the pose a little; do not start over for it.
+        self._at_end = to_end <= (2.0 if self._at_end else 1.0) * tolerance
+        self._at_end = self._at_end and left <= 2.0 * tolerance
+        if not self._at_end:
+            return None, False
+        error = 0.0 if path.heading is None else difference(path.heading, pose.heading)
+        if abs(error) <= self.ends.heading_tolerance:
+            return Velocity(), True
+        return self._turn(error), False
+
+    def _on_the_way(
+        self,
+        pose: Pose2,
+        path: Path,
+        readings: Readings | None,
+        dt: float,
+        off: float,
+        left: float,
+    ) -> Velocity:
+        if readings is not None:
+            ahead = self._in_the_path(pose, path, readings)
+            self._seen = self._seen + 1 if ahead else 0
+        if not self._around and self._seen >= _ENOUGH:
+            self._around = True
+            x, y = path.at(self._arc + self.detour.rejoin)
+            self._navigator.go((float(x), float(y)))
+        if self._around and readings is not None:
+            step = self._navigator.step(readings, pose, dt)
+            if step.mode is Mode.UNREACHABLE:
+                self.blocked_by = step.reason
+                return Velocity()
+            back = step.mode is Mode.APPROACH and off <= self.detour.half_width
+            if not (step.mode is Mode.ARRIVED or (back and not self._seen)):
+                return step.velocity
+            self._around = False
+            self._keeper.follow(_rest(path, self._arc))
+        elif self._around:
+            return Velocity()  # blind
+        return self._along(pose, path, left)
+
+    def _along(self, pose: Pose2, path: Path, left: float) -> Velocity:
+        """Return the velocity along the free path."""
+        ends = self.ends
+        braking = math.sqrt(2.0 * ends.approach_deceleration * left)
+        speed = min(self.limits.max_speed, max(braking, ends.crawl_speed))
+        if len(path.points) > 1 and left > _LAST_M:
+            return self._keeper.step(pose, speed).velocity
+        end_x, end_y = path.end
+        error = difference(math.atan2(end_y - pose.y, end_x - pose.x), pose.heading)
+        if abs(error) > ends.turn_in_place_above:
+            return self._turn(error)
+        return Velocity(speed * math.cos(error), ends.turn_gain * error)
+
+    def _turn(self, error: float) -> Velocity:
+        rate = min(self.ends.turn_gain * abs(error), self.ends.turn_rate_in_place)
+        rate = min(max(rate, self.ends.turn_rate_min), self.limits.max_turn_rate)
+        return Velocity(0.0, math.copysign(rate, error))
+
+    def _in_the_path(self, pose: Pose2, path: Path, readings: Readings) -> bool:
+        """Return whether what a sensor hears ahead stands in the path, wherever in its cone."""
+        detour = self.detour
+        for sensor in (1, 2, 3):
+            distance, mount = readings.distances_m[sensor], self._mounts[sensor]
+            if not distance <= detour.notice or readings.ages_s[sensor] > 0.5:
+                continue
+            inside = True
+            for bearing in (-_HALF_CONE_RAD, 0.0, _HALF_CONE_RAD):
+                at = pose @ mount @ Pose2(0.0, 0.0, bearing) @ Pose2(distance)
+                arc, off = path.project(at.x, at.y, self._arc, self._arc + 1.5)
+                inside = inside and off <= detour.half_width and arc > self._arc
+            if inside:
+                return True
+        return False
+
+
+def _rest(path: Path, arc: float) -> Path:
+    """Return what is left of a path from a length along it."""
+    return Path(np.concatenate([path.at(arc)[None], path.points[path.arc > arc + 1e-6]]))
