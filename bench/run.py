@@ -17,6 +17,7 @@ import memory
 import monte_carlo
 import offline
 import processor
+import protocols
 import solvers
 from result import Result
 from rich.console import Console
@@ -31,6 +32,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'processor': processor.measure,
     'memory': memory.measure,
     'fuzzy': fuzzy.measure,
+    'protocols': protocols.measure,
 }
 WITH_BAR = {'solvers', 'monte_carlo'}
 """Those that show a bar of their own, with which a spinner would fight for the line."""
