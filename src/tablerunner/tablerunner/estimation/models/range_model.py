@@ -59,9 +59,9 @@ def predict_range(
         d(range)/d(state); units 1, 1, m/rad, 0 ... m/s, 0 ... 1, 0 ... m. Zero towards an anchor
         that the tag touches.
     """
-    jacobian = np.zeros(len(mean))
-    tag = _tag(mean, lever_arm, twist)
-    return _range(mean, tag, anchor, bias_index, jacobian), jacobian
+    jacobian, values = np.zeros(len(mean)), mean.tolist()
+    tag = _tag(values, lever_arm, twist)
+    return _range(values, tag, anchor, bias_index, jacobian), jacobian
 
 
 def predict_ranges(
@@ -84,10 +84,10 @@ def predict_ranges(
     expected : list of float
     jacobian : ndarray, shape (m, n)
     """
-    jacobian = np.zeros((len(anchors), len(mean)))
-    tag = _tag(mean, lever_arm, twist)
+    jacobian, values = np.zeros((len(anchors), len(mean))), mean.tolist()
+    tag = _tag(values, lever_arm, twist)
     expected = [
-        _range(mean, tag, anchor, index, row)
+        _range(values, tag, anchor, index, row)
         for (anchor, index), row in zip(anchors, jacobian, strict=True)
     ]
     return expected, jacobian
@@ -105,9 +105,9 @@ class _Tag(NamedTuple):
     by_delay_y: float
 
 
-def _tag(mean: Vector, lever_arm: Point3, twist: Twist) -> _Tag:
+def _tag(values: list[float], lever_arm: Point3, twist: Twist) -> _Tag:
     # Plain floats: this runs for every range, and reading an array element costs ten times more.
-    x, y, heading, _, _, _, delay = mean[:RANGE_BIAS].tolist()
+    x, y, heading, delay = values[X], values[Y], values[HEADING], values[RANGE_DELAY]
     speed, turn_rate = twist
     cos, sin = math.cos(heading), math.sin(heading)
     # Along and across the heading.
@@ -131,13 +131,13 @@ def _tag(mean: Vector, lever_arm: Point3, twist: Twist) -> _Tag:
     )
 
 
-def _range(mean: Vector, tag: _Tag, anchor: Point3, index: int, jacobian: Vector) -> float:
+def _range(values: list[float], tag: _Tag, anchor: Point3, index: int, jacobian: Vector) -> float:
     """Return the expected range; fill the Jacobian, which is zero before."""
     tag_x, tag_y, tag_z, from_base_x, from_base_y, by_delay_x, by_delay_y = tag
     dx, dy, dz = tag_x - anchor[0], tag_y - anchor[1], tag_z - anchor[2]
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-    bias, scale = RANGE_BIAS + index, range_scale(len(mean)) + index
-    grown = 1.0 + float(mean[scale])
+    bias, scale = RANGE_BIAS + index, range_scale(len(values)) + index
+    grown = 1.0 + values[scale]
     if distance > NEAREST_M:
         ux, uy = grown * dx / distance, grown * dy / distance
         jacobian[X] = ux
@@ -146,7 +146,7 @@ def _range(mean: Vector, tag: _Tag, anchor: Point3, index: int, jacobian: Vector
         jacobian[RANGE_DELAY] = ux * by_delay_x + uy * by_delay_y
     jacobian[bias] = 1.0
     jacobian[scale] = distance
-    return grown * distance + float(mean[bias])
+    return grown * distance + values[bias]
 
 
 def predict_range_many(
