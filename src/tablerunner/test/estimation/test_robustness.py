@@ -16,7 +16,7 @@ from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry.motion import Motion, advance
 from tablerunner.types import OdometrySample, RangeSample
 
-SEEDS = range(6)
+SEEDS = range(4)
 DT = 0.02
 START = Pose2(4.0, 3.0, 0.8)
 NOISE_M = 0.1
