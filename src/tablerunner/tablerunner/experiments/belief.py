@@ -92,3 +92,17 @@ def believe(
         np.array(covariances).reshape(-1, 3, 3),
         tuple(innovations),
     )
+
+
+def estimated(
+    drive: Drive,
+    ranger: RangerConfig,
+    odometer: OdometerConfig,
+    localizer: LocalizerConfig,
+) -> tuple[NDArray[np.int64], Matrix]:
+    """Return stamps, (m,), and places, (m, 2), of what an estimator believed at each odometry.
+
+    Everything goes through the code that the nodes run, in the order in which it was measured.
+    """
+    belief = believe(sense(drive, ranger, odometer), localizer, ranger.anchors)
+    return belief.stamps, belief.poses[:, :2]

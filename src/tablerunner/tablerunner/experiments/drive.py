@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.errors import TablerunnerError
-from tablerunner.estimation import Localizer, LocalizerConfig
 from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry import Odometer, OdometerConfig
@@ -139,37 +138,6 @@ def dead_reckoned(drive: Drive, config: OdometerConfig) -> tuple[NDArray[np.int6
     start = Pose2(*drive.poses[0]) @ poses[0].inverse()
     laid = [start @ pose for pose in poses]
     return np.array(stamps, dtype=np.int64), np.array([(pose.x, pose.y) for pose in laid])
-
-
-def estimated(
-    drive: Drive,
-    ranger: RangerConfig,
-    odometer: OdometerConfig,
-    localizer: LocalizerConfig,
-) -> tuple[NDArray[np.int64], Array]:
-    """Return stamps, (m,), and places, (m, 2), of what an estimator believed at each odometry.
-
-    Everything goes through the code that the nodes run, in the order in which it was measured.
-    """
-    ranging, odometry = Ranger(ranger), Odometer(odometer)
-    fusing = Localizer(localizer, ranger.anchors)
-    stamps, places = [], []
-    for sample in drive.samples:
-        if isinstance(sample, ImuSample):
-            odometry.add_imu(sample)
-        elif isinstance(sample, ExchangeSample):
-            ranged = ranging.add(sample)
-            if isinstance(ranged, RangeSample):
-                fusing.add_range(ranged)
-        elif isinstance(sample, WheelSample):
-            moved = odometry.add_wheels(sample)
-            if isinstance(moved, OdometrySample):
-                fusing.add_odometry(moved)
-                believed = fusing.estimate
-                if believed is not None:
-                    stamps.append(believed.stamp)
-                    places.append(believed.mean[:2])
-    return np.array(stamps, dtype=np.int64), np.array(places).reshape(-1, 2)
 
 
 def errors_of(drive: Drive, stamps: NDArray[np.int64], places: Array) -> Array:

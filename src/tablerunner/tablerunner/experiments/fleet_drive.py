@@ -97,8 +97,8 @@ def estimated_fleet(
 ) -> Iterator[tuple[int, Array]]:
     """Yield the index of each odometry after the first and the believed places, (runs, 2) [m].
 
-    `experiments.drive.estimated` over arrays: on the same samples the same places. The localiser's
-    own doings that a clean drive does not need are left out: being lost, and late data.
+    `experiments.belief.estimated` over arrays: on the same samples the same places. What the
+    localiser does that a clean drive does not need is left out: being lost, and late data.
 
     Parameters
     ----------

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.estimation import EstimatorConfig, LocalizerConfig
+from tablerunner.experiments.belief import estimated
 from tablerunner.experiments.drive import (
     Drive,
     dead_reckoned,
     drive_route,
     errors_of,
-    estimated,
     uwb_fixes,
 )
 from tablerunner.experiments.experiment import Bound, Outcome, Progress, Row, Spread

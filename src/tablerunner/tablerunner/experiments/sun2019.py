@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from tablerunner.errors import TablerunnerError
 from tablerunner.estimation import LocalizerConfig
 from tablerunner.evaluation.kept_errors import ErrorKeeper, KeptErrors
-from tablerunner.experiments.drive import Drive, drive_route, estimated, uwb_fixes
+from tablerunner.experiments.belief import estimated
+from tablerunner.experiments.drive import Drive, drive_route, uwb_fixes
 from tablerunner.experiments.experiment import Bound, Outcome, Progress, Row, Spread
 from tablerunner.experiments.fleet_drive import drive_fleet, estimated_fleet, ranged, reckoned
 from tablerunner.experiments.seeds import run_seeds

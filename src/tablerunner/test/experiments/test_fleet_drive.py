@@ -11,12 +11,12 @@ import pytest
 from tablerunner.errors import ConfigError, TablerunnerError
 from tablerunner.estimation import LocalizerConfig
 from tablerunner.experiments import fleet_drive
+from tablerunner.experiments.belief import estimated
 from tablerunner.experiments.drive import (
     Drive,
     dead_reckoned,
     drive_route,
     errors_of,
-    estimated,
     uwb_fixes,
 )
 from tablerunner.experiments.fleet_drive import (
