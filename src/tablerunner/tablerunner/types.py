@@ -180,6 +180,17 @@ class UltrasonicSample:
 
 
 @dataclass(frozen=True, slots=True)
+class PersonSample:
+    """Where a person with a tag is and how the person walks, along the axes of base_link."""
+
+    stamp: int
+    tag_id: str
+    position: tuple[float, float]  # of the tag [m]
+    velocity: tuple[float, float]  # over the floor [m/s]
+    covariance: Matrix  # (4, 4): position and velocity; inf: a velocity that is not known
+
+
+@dataclass(frozen=True, slots=True)
 class Velocity:
     """Velocity of a differential drive: forward [m/s] and turn rate [rad/s]."""
 

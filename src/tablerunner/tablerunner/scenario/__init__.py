@@ -8,8 +8,13 @@ from tablerunner.scenario.anchor import AnchorPlace
 from tablerunner.scenario.box import Box
 from tablerunner.scenario.kitchen import Kitchen
 from tablerunner.scenario.outline import Outline
-from tablerunner.scenario.person import Person
-from tablerunner.scenario.robot import DriveLimits, RobotGeometry, UltrasonicMount
+from tablerunner.scenario.person import Person, PersonTag
+from tablerunner.scenario.robot import (
+    AnchorMount,
+    DriveLimits,
+    RobotGeometry,
+    UltrasonicMount,
+)
 from tablerunner.scenario.scenario import Scenario, load_scenario
 from tablerunner.scenario.sensors import (
     ImuErrors,
@@ -23,6 +28,7 @@ from tablerunner.scenario.table import Table
 from tablerunner.scenario.wall import Wall
 
 __all__ = [
+    'AnchorMount',
     'AnchorPlace',
     'Box',
     'DriveLimits',
@@ -31,6 +37,7 @@ __all__ = [
     'MagneticErrors',
     'Outline',
     'Person',
+    'PersonTag',
     'RobotGeometry',
     'Scenario',
     'SensorErrors',
