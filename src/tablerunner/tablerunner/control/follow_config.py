@@ -31,6 +31,27 @@ class FollowConfig(Config):
     turn_gain: float = parameter(
         1.5, description='Turn rate over bearing', unit='1/s', above=0.0, dynamic=True
     )
+    corner_cut: float = parameter(
+        0.4,
+        description='How far the straight line to the person may leave the way the person walked',
+        unit='m',
+        low=0.0,
+        dynamic=True,
+    )
+    trail_std: float = parameter(
+        0.4,
+        description='A place less certain than this is not put to that way',
+        unit='m',
+        above=0.0,
+        dynamic=True,
+    )
+    seek_speed: float = parameter(
+        0.3,
+        description='Largest speed to where the person was last seen; 0: waits where it is',
+        unit='m/s',
+        low=0.0,
+        dynamic=True,
+    )
     start_margin: float = parameter(
         0.15,
         description='A robot that stands starts when the person is farther than set by this',

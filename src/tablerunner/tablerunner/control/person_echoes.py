@@ -14,6 +14,8 @@ from tablerunner.types import PersonSample
 HALF_CONE_RAD = 0.24
 _SIGMAS = 2.0
 _LEAST_M = 0.1  # noise of the echo, a step since the reading
+_HALF_WIDTH_M = 0.35  # of the way ahead: the hull and a little
+_TOUCHING_M = 0.15
 
 
 def without_person(
@@ -53,3 +55,41 @@ def without_person(
             distances[index] = math.inf
     a, b, c, d, e = distances
     return Readings((a, b, c, d, e), readings.ages_s)
+
+
+def in_the_way(
+    readings: Readings, mounts: tuple[Pose2, ...], target: tuple[float, float], notice: float
+) -> bool:
+    """Return whether what the three sensors ahead hear stands between base_link and a target.
+
+    An echo may come from anywhere on an arc; it is in the way when the whole arc is near the
+    straight line to the target, or when it is so near that any turn would meet it.
+
+    Parameters
+    ----------
+    readings : Readings
+    mounts : tuple of Pose2
+        Of the sensors, in base_link.
+    target : tuple of float
+        In base_link [m].
+    notice : float
+        What is farther from the sensor is not looked at [m].
+    """
+    away = max(math.hypot(*target), 1e-6)
+    along = target[0] / away, target[1] / away
+    for distance, mount in list(zip(readings.distances_m, mounts, strict=True))[1:4]:
+        if not distance < notice:
+            continue
+        if distance < _TOUCHING_M:
+            return True
+        courses = [mount.heading + side * HALF_CONE_RAD for side in (-1.0, 0.0, 1.0)]
+        points = [
+            (mount.x + distance * math.cos(course), mount.y + distance * math.sin(course))
+            for course in courses
+        ]
+        if all(
+            x * along[0] + y * along[1] > 0.0 and abs(y * along[0] - x * along[1]) <= _HALF_WIDTH_M
+            for x, y in points
+        ):
+            return True
+    return False

@@ -66,11 +66,11 @@ class PersonLocatorConfig(Config):
         dynamic=True,
     )
     nlos_std: float = parameter(
-        0.4,
+        1.5,
         unit='m',
-        description='Added deviation of a range that is surely NLOS',
+        description='Added deviation of a range that is surely NLOS: its excess lasts a while',
         low=0.0,
-        high=5.0,
+        high=10.0,
         dynamic=True,
     )
     tracker: TargetTrackerConfig = parameter(

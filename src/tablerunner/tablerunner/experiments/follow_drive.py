@@ -194,7 +194,7 @@ def follow(
         safety_config,
     )
     safety = SafetyStop(safety_config, limits, mounts)
-    ring, log, moved = UltrasonicRing(), _Log(), Velocity()
+    ring, log, moved, odom = UltrasonicRing(), _Log(), Velocity(), Pose2()
     begin = sim.now_ns
     follower.start(begin)
     command: Velocity | None = None
@@ -212,6 +212,7 @@ def follow(
                 odometry = odometer.add_wheels(sample)
                 if isinstance(odometry, OdometrySample):
                     locator.add_odometry(odometry)
+                    odom = odometry.pose
                     moved = Velocity(odometry.linear_m_s, odometry.angular_rad_s)
             elif isinstance(sample, UltrasonicSample):
                 ring.add(sample, sim.now_ns)
@@ -223,7 +224,9 @@ def follow(
             continue
         now, dt = sim.now_ns, CONTROL_STEPS / 100
         sight = locator.sight(now)
-        step = follower.step(now, dt, sight.person, sight.reason, ring.readings(now), blocked)
+        step = follower.step(
+            now, dt, odom, sight.person, sight.reason, ring.readings(now), blocked
+        )
         decision = safety.step(now, step.velocity, now, Localisation(), moved)
         blocked = decision.blocked and decision.velocity.linear_m_s == 0.0
         command = decision.velocity
@@ -232,10 +235,8 @@ def follow(
             place = tuple(sim.drive.pose.transform(np.array(sight.person.position)))
         worn = tag_place(sim.people[index], tag.position)
         pose = sim.drive.pose
-        log.rows.append(
-            ((now - begin) / NANOSECONDS, pose.x, pose.y, pose.heading)
-            + (worn[0], worn[1], place[0], place[1], sim.drive.linear_m_s, float(blocked))
-        )
+        at = ((now - begin) / NANOSECONDS, pose.x, pose.y, pose.heading)
+        log.rows.append((*at, *worn[:2], *place, sim.drive.linear_m_s, float(blocked)))
         log.states.append(step.state)
         reason = step.reason
         if step.state is FollowState.GIVEN_UP and step.velocity.linear_m_s == 0.0:
