@@ -25,6 +25,7 @@ from tablerunner.geometry.pose import Pose2
 from tablerunner.types import PersonSample, Velocity, seconds
 
 _WALKS_M_S = 0.1  # slower is standing: noise of the velocity
+_THERE_M = 0.03  # so near to the set distance is there
 _NEARER_M = 0.2  # having come nearer by less is no progress
 _HELD_S = 3.0  # held up for so long, the robot looks around
 _UNSEEN_S = 1.5  # and without the person for so long
@@ -294,7 +295,7 @@ class PersonFollower:
         if self._state is FollowState.STANDING or self._state is FollowState.LOST:
             goes = error > config.start_margin or (error > 0.0 and walks > _WALKS_M_S)
         else:
-            goes = error > 0.0 or walks > _WALKS_M_S
+            goes = error > _THERE_M or (walks > _WALKS_M_S and error > -_THERE_M)
         if not goes:
             self._state = FollowState.STANDING
             bearing = math.atan2(person.position[1], person.position[0])
