@@ -14,6 +14,7 @@ from tablerunner.cli.compare import compare
 from tablerunner.cli.convert import convert_app
 from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
 from tablerunner.cli.explain_rule import explain_rule
+from tablerunner.cli.follow_test import follow_test
 from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
@@ -43,6 +44,7 @@ def make_app() -> typer.Typer:
     app.command()(reproduce)
     app.command()(compare)
     app.command()(explain_rule)
+    app.command()(follow_test)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')
     for entry in sorted(entry_points(group=GROUP), key=lambda item: item.name):

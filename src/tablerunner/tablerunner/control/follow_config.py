@@ -98,6 +98,14 @@ class FollowConfig(Config):
         above=0.0,
         dynamic=True,
     )
+    bearing_std: float = parameter(
+        0.35,
+        description='Far away, where a direction that is certain within this is enough',
+        unit='rad',
+        above=0.0,
+        high=1.5,
+        dynamic=True,
+    )
     give_up_after: float = parameter(
         30.0,
         description='Gives up when the person was out of sight for longer',

@@ -218,9 +218,11 @@ class PersonFollower:
         x, y = person.position
         if not (math.isfinite(x) and math.isfinite(y)):
             return 'place of the tag is not finite'
-        if not _deviation(person) <= self.config.position_std:
+        distance = math.hypot(x, y)
+        enough = max(self.config.position_std, self.config.bearing_std * distance)
+        if not _deviation(person) <= enough:
             return 'place of the tag is too uncertain'
-        if math.hypot(x, y) > self.config.reach:
+        if distance > self.config.reach:
             return f'the person is farther away than {self.config.reach:g} m'
         return ''
 

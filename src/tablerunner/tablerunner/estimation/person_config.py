@@ -66,7 +66,7 @@ class PersonLocatorConfig(Config):
         dynamic=True,
     )
     nlos_std: float = parameter(
-        1.5,
+        0.8,
         unit='m',
         description='Added deviation of a range that is surely NLOS: its excess lasts a while',
         low=0.0,

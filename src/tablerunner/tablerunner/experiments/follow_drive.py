@@ -48,6 +48,7 @@ CALIBRATION_M = 1.0
 CALIBRATION_ROUNDS = 60
 """Before the drive the tag is held at four points at this distance (Bae), so often each."""
 
+_WALKS_M_S = 0.1
 _CALIBRATION_NS = 100_000  # between two of its exchanges: all are over when the drive begins
 _FAR = PersonState('', Pose2(1e6, 1e6), 0.0, 0.1)
 
@@ -115,6 +116,12 @@ class FollowDrive:
     def in_sight(self) -> NDArray[np.bool_]:
         """Whether the tag was in sight, shape (k,)."""
         return np.asarray(np.isfinite(self.located[:, 0]))
+
+    @property
+    def walks(self) -> NDArray[np.bool_]:
+        """Whether the person walks, shape (k,)."""
+        way = np.linalg.norm(np.gradient(self.tag, axis=0), axis=1)
+        return np.asarray(way > _WALKS_M_S * CONTROL_STEPS / 100)
 
     @property
     def hits(self) -> int:
