@@ -10,7 +10,7 @@ Point = tuple[float, float]
 _SPACING_M = 0.4  # crumbs nearer to each other tell more of noise than of the way
 _LONGEST = 50  # crumbs: 20 m
 _REACHED_M = 0.5  # a crumb so near has been reached
-_WINDOW_M = 2.0  # the robot is not farther ahead on the trail than this since the last look
+_DETOUR, _SLACK_M = 2.0, 2.0  # the way is no longer than the straight line times and plus
 
 
 class PersonTrail:
@@ -46,6 +46,7 @@ class PersonTrail:
         cut_m : float
             The straight line leaves the way that was walked by no more than this.
         """
+        self._shorten(robot, person)
         way = [*self._points, person]
         passed = _passed(way, robot)
         del self._points[: min(passed, len(self._points) - 1)]
@@ -56,19 +57,27 @@ class PersonTrail:
                 return way[last]
         return way[min(1, len(way) - 1)]
 
+    def _shorten(self, robot: Point, person: Point) -> None:
+        """Drop crumbs that lie farther back than a robot that is so near can be."""
+        most = _DETOUR * math.dist(robot, person) + _SLACK_M
+        length, last = 0.0, person
+        for index in range(len(self._points) - 1, -1, -1):
+            length += math.dist(last, self._points[index])
+            last = self._points[index]
+            if length > most:
+                del self._points[:index]
+                return
+
 
 def _passed(way: list[Point], place: Point) -> int:
-    """Return which part of a way is nearest to a place, among the first ones."""
-    best, answer, length = math.inf, 0, 0.0
+    """Return which part of a way is nearest to a place, or the last one that is reached."""
+    best, answer = math.inf, 0
     for index, (here, there) in enumerate(pairwise(way)):
         away = _away(place, here, there)
         if away < best:
             best, answer = away, index
         if math.dist(place, there) < _REACHED_M and index + 2 < len(way):
             best, answer = 0.0, index + 1
-        length += math.dist(here, there)
-        if length > _WINDOW_M:
-            break
     return answer
 
 

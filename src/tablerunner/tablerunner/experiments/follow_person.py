@@ -175,13 +175,13 @@ def lost_and_found(room: str, drive: FollowDrive) -> dict[str, float]:
         for begin, end in zip(edges[::2], edges[1::2], strict=True)
         if end - begin >= _LOST_S / _STEP_S and drive.times_s[begin] > SETTLED_S
     ]
-    found = 0
-    ended = [(begin, end) for begin, end in long_ones if end < len(lost)]
-    for _, end in ended:
-        after = lost[end : end + round(_FOUND_S / _STEP_S)]
-        found += drive.states[end] is not FollowState.GIVEN_UP and not after.all()
+    # Where the person stayed away until the robot gave up there was nothing to find.
+    ended = [end for _, end in long_ones if end < len(lost) and drive.in_sight[end]]
+    found = sum(drive.states[end] is not FollowState.GIVEN_UP for end in ended)
+    found -= sum(bool(lost[end : end + round(_FOUND_S / _STEP_S)].all()) for end in ended)
     return {
         f'{room}, times lost': float(len(long_ones)),
+        f'{room}, given up': 100.0 * (drive.states[-1] is FollowState.GIVEN_UP),
         f'{room}, found again': 100.0 * found / len(ended) if ended else 100.0,
         f'{room}, touches': float(drive.hits),
     }
