@@ -11,7 +11,12 @@ from tablerunner.control.mission import Mission
 from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner, PlannerConfig
-from tablerunner.control.registry import CONTROLLERS, ControllerSettings, make_controller
+from tablerunner.control.registry import (
+    CONTROLLERS,
+    ControllerSettings,
+    configure_controller,
+    make_controller,
+)
 from tablerunner.control.room import (
     floor_map,
     home_of,
@@ -52,6 +57,7 @@ __all__ = [
     'SafetyStop',
     'Situation',
     'VelocityLimits',
+    'configure_controller',
     'floor_map',
     'home_of',
     'largest_speed',
