@@ -34,7 +34,7 @@ LIMIT_S = 240.0
 """A tour that takes longer than this for each of its stops, home included, is endless."""
 
 THERE_M = 0.4
-"""Who says to have arrived must be within this of the stop: tolerance, and an error of the pose."""
+"""Who says to have arrived must be within this of the stop: tolerance and an error of the pose."""
 
 _KNOWN_RAD = 0.2
 _EVERY = 4  # of the control steps are kept of the track
