@@ -146,7 +146,7 @@ class RoomDrive:
 
     def as_json(self) -> dict[str, Any]:
         """Return everything but track and people as what JSON knows."""
-        return {
+        content = {
             'seed': self.seed,
             'controller': self.controller,
             'kind': self.kind,
@@ -169,6 +169,20 @@ class RoomDrive:
             'heading_rmse_rad': self.heading_rmse_rad,
             'events': [[round(time, 2), event] for time, event in self.events],
         }
+        return _strict(content)
+
+
+def _strict(content: dict[str, Any]) -> dict[str, Any]:
+    """Return the same with None for what is not finite, which JSON cannot say."""
+    found: dict[str, Any] = {}
+    for name, value in content.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            found[name] = None
+        elif isinstance(value, list):
+            found[name] = [_strict(item) if isinstance(item, dict) else item for item in value]
+        else:
+            found[name] = value
+    return found
 
 
 def drive_room(
