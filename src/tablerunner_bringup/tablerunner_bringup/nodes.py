@@ -41,10 +41,26 @@ NODES: tuple[NodeSpec, ...] = (
 )
 """All nodes; they may be started in any order, and side by side."""
 
+PERSON_DRIVER = NodeSpec(
+    'person_driver',
+    'uwb_driver',
+    'uwb_driver',
+    parameters.person_driver,
+    remap=tuple(
+        (f'uwb/{name}', f'person/{name}') for name in ('exchanges', 'ranges', 'anchors', 'pose')
+    ),
+)
+"""uwb_driver once more, for the anchors that a robot carries and the tags that people wear."""
+
 COMMANDING = 'nav_controller'
 """The node whose end takes the command away: the safety stop behind it goes to zero on silence."""
 
 
-def nodes_of(options: RunOptions) -> tuple[NodeSpec, ...]:
-    """Return the nodes of a run: on a real robot none that simulates."""
-    return tuple(spec for spec in NODES if options.simulated or not spec.simulation_only)
+def nodes_of(options: RunOptions, scenario: Scenario | None = None) -> tuple[NodeSpec, ...]:
+    """Return the nodes of a run: on a real robot none that simulates.
+
+    Where the robot carries anchors there is one more.
+    """
+    carried = scenario is not None and bool(scenario.robot.anchors)
+    specs = (*NODES, PERSON_DRIVER) if carried else NODES
+    return tuple(spec for spec in specs if options.simulated or not spec.simulation_only)
