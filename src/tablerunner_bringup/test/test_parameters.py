@@ -101,7 +101,10 @@ def test_parameters_real_robot_uses_system_time(odd):
 CARRIED = """
 people: [{name: host, route: [[5, 5]], tag: {id: host_tag, position: [-0.25, 0, 1]}}]
 """
-RING = 'anchors: [{id: R0, position: [0, 1, 1]}, {id: R1, position: [1, 0, 1]}, {id: R2, position: [0, 0, 1]}]'
+RING = (
+    'anchors: [{id: R0, position: [0, 1, 1]}, {id: R1, position: [1, 0, 1]}, '
+    '{id: R2, position: [0, 0, 1]}]'
+)
 
 
 def test_parameters_robot_with_anchors_has_a_driver_for_them(tmp_path):
