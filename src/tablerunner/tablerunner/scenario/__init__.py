@@ -6,10 +6,11 @@ what cannot be.
 
 from tablerunner.scenario.anchor import AnchorPlace
 from tablerunner.scenario.box import Box
+from tablerunner.scenario.camera import Camera, Light
 from tablerunner.scenario.kitchen import Kitchen
 from tablerunner.scenario.outline import Outline
 from tablerunner.scenario.person import Person
-from tablerunner.scenario.robot import DriveLimits, RobotGeometry, UltrasonicMount
+from tablerunner.scenario.robot import DriveLimits, Marker, RobotGeometry, UltrasonicMount
 from tablerunner.scenario.scenario import Scenario, load_scenario
 from tablerunner.scenario.sensors import (
     ImuErrors,
@@ -25,10 +26,13 @@ from tablerunner.scenario.wall import Wall
 __all__ = [
     'AnchorPlace',
     'Box',
+    'Camera',
     'DriveLimits',
     'ImuErrors',
     'Kitchen',
+    'Light',
     'MagneticErrors',
+    'Marker',
     'Outline',
     'Person',
     'RobotGeometry',

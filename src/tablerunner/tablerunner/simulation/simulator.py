@@ -5,6 +5,7 @@ from __future__ import annotations
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import Scenario
 from tablerunner.simulation.bumper import Bumper
+from tablerunner.simulation.camera import CameraFeed
 from tablerunner.simulation.drive import Drive
 from tablerunner.simulation.encoders import Encoders
 from tablerunner.simulation.imu import Imu
@@ -18,6 +19,7 @@ from tablerunner.simulation.truth import Contact, PersonState, RangeTruth, Truth
 from tablerunner.types import (
     NANOSECONDS,
     ExchangeSample,
+    ImageSample,
     ImuSample,
     MagneticSample,
     Refusal,
@@ -39,6 +41,7 @@ Sample = (
     | MagneticSample
     | ExchangeSample
     | UltrasonicSample
+    | ImageSample
     | Truth
     | RangeTruth
     | Contact
@@ -72,6 +75,7 @@ class Simulator:
         self.sonar = Sonar(scenario, stream(seed, 'sonar'))
         self.crowd = Crowd(scenario.people, seed)
         self.bumper = Bumper(scenario.outlines, robot.footprint_radius)
+        self.camera = CameraFeed(scenario, seed, START_NS) if scenario.camera else None
         self._wheels_due = Schedule(1.0 / errors.wheels.rate, START_NS)
         self._imu_due = Schedule(1.0 / errors.imu.rate, START_NS)
         self._magnetic_due = Schedule(1.0 / errors.magnetic.rate, START_NS)
@@ -103,7 +107,7 @@ class Simulator:
         -------
         tuple
             What was measured at the new `now_ns`, in a fixed order: contacts and refused commands
-            first, then truth and wheels (together), IMU, magnetometer, UWB, ultrasonic.
+            first, then truth and wheels (together), IMU, magnetometer, UWB, ultrasonic, camera.
         """
         samples: list[Sample] = []
         dt_s = seconds(STEP_NS)
@@ -130,4 +134,8 @@ class Simulator:
                 samples.append(exchange)
         if self._sonar_due.is_due(now) and self.scenario.robot.ultrasonics:
             samples.append(self.sonar.fire(now, self.drive.pose, self.people))
+        if self.camera is not None:
+            image = self.camera.step(self.truth, self.people)
+            if image is not None:
+                samples.append(image)
         return tuple(samples)

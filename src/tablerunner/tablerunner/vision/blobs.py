@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -28,6 +27,9 @@ EDGE_PIXELS = 2
 RING_PIXELS = 5
 """How far beyond the disc its plate is looked at."""
 
+TOGETHER = 1.3
+"""How much larger two discs that hang together are than the larger of them, with some room."""
+
 _KERNEL = np.ones((3, 3), dtype=np.uint8)
 
 
@@ -45,6 +47,8 @@ class Blob:
         Of a disc of the same area [m].
     elongation : float
         How much longer than wide it is: 1 for a disc.
+    grain : float
+        Width of a pixel there, as a share of the radius.
     surround : float
         Colour around it, as a share of its own.
     at_border : bool
@@ -55,6 +59,7 @@ class Blob:
     variance: float
     radius: float
     elongation: float
+    grain: float
     surround: float
     at_border: bool
 
@@ -84,7 +89,7 @@ def _between(hsv: Picture, low: int, high: int, least: tuple[int, int]) -> Mask:
 def blobs_of(
     picture: Picture, mask: Mask, ground: GroundMap, noise: float, radii: tuple[float, float]
 ) -> list[Blob]:
-    """Return the patches of a mask that are neither far too small nor far too large.
+    """Return the discs of a mask that are neither far too small nor far too large.
 
     Parameters
     ----------
@@ -95,68 +100,98 @@ def blobs_of(
     noise : float
         Deviation of a pixel in grey levels.
     radii : tuple of 2 floats
-        Least and largest radius worth a closer look [m].
+        Least and largest radius [m].
     """
     count, labels, stats, centres = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    patches = np.asarray(labels, dtype=np.int32)
-    found = []
+    found: list[Blob] = []
     for index in range(1, count):
         pixels = int(stats[index, cv2.CC_STAT_AREA])
         if pixels < LEAST_PIXELS:
             continue
         column, row = centres[index].astype(int)
         radius = math.sqrt(pixels * float(ground.area[row, column]) / math.pi)
-        if not radii[0] < radius < radii[1]:
+        # Two discs of a coarse picture may hang together here.
+        if not radii[0] < radius < TOGETHER * radii[1]:
             continue
-        blob = _measure(picture, patches, index, stats[index], ground, noise)
-        if blob is not None:
-            found.append(blob)
+        left, top, width, height = (int(value) for value in stats[index, :4])
+        window = _Window(picture, ground, top, left, height, width)
+        own = np.asarray(labels[window.part] == index, dtype=np.uint8)
+        found += [blob for blob in window.discs(own, noise) if radii[0] < blob.radius < radii[1]]
     return found
 
 
-def _measure(
-    picture: Picture,
-    labels: NDArray[np.int32],
-    index: int,
-    stats: NDArray[Any],
-    ground: GroundMap,
-    noise: float,
-) -> Blob | None:
-    left, top, width, height = (int(value) for value in stats[:4])
-    rows, columns = labels.shape
-    border = left == 0 or top == 0 or left + width == columns or top + height == rows
-    reach = EDGE_PIXELS + RING_PIXELS
-    window = np.s_[
-        max(top - reach, 0) : top + height + reach, max(left - reach, 0) : left + width + reach
-    ]
-    own = np.asarray(labels[window] == index, dtype=np.uint8)
-    disc = cv2.dilate(own, _KERNEL, iterations=EDGE_PIXELS) > 0
-    ring = (cv2.dilate(own, _KERNEL, iterations=reach) > 0) & ~disc
-    colours = picture[window]
-    # Between a colour and any grey, max - min is in proportion to the share of the colour: the
-    # weight of a pixel that a disc covers in part.
-    chroma = colours.max(axis=2).astype(np.float32) - colours.min(axis=2)
-    behind = float(np.median(chroma[ring])) if ring.any() else 0.0
-    full = float(np.percentile(chroma[own > 0], 75.0)) - behind
-    area = ground.area[window][disc]
-    if full <= 0.0 or not np.all(np.isfinite(area)):
-        return None
-    share = np.clip((chroma[disc] - behind) / full, 0.0, None) * area
-    total = float(share.sum())
-    x, y = ground.x[window][disc].astype(float), ground.y[window][disc].astype(float)
-    centre_x, centre_y = float(share @ x) / total, float(share @ y) / total
-    x -= centre_x
-    y -= centre_y
-    xx, xy, yy = (float(share @ part) / total for part in (x * x, x * y, y * y))
-    middle, half = (xx + yy) / 2.0, math.hypot((xx - yy) / 2.0, xy)
-    # What noise of the pixels does to a weighted mean; max - min has that of two of them.
-    spread = math.sqrt(2.0) * noise / full * area
-    variance = float(np.sum(spread**2 * (x * x + y * y))) / 2.0 / total**2
-    return Blob(
-        (centre_x, centre_y),
-        variance,
-        math.sqrt(total / math.pi),
-        math.sqrt((middle + half) / max(middle - half, 1e-12)),
-        behind / (full + behind),
-        border,
-    )
+class _Window:
+    """The part of a picture around a patch of colour."""
+
+    def __init__(
+        self, picture: Picture, ground: GroundMap, top: int, left: int, height: int, width: int
+    ) -> None:
+        reach = EDGE_PIXELS + RING_PIXELS
+        rows, columns = picture.shape[:2]
+        self.part = np.s_[
+            max(top - reach, 0) : top + height + reach, max(left - reach, 0) : left + width + reach
+        ]
+        self.at_border = left == 0 or top == 0 or left + width == columns or top + height == rows
+        colours = picture[self.part]
+        # Between a colour and any grey, max - min is in proportion to the share of the colour: of
+        # a pixel at the rim, beside the whole ones next to it, it tells how much the disc covers.
+        self._chroma = colours.max(axis=2) - colours.min(axis=2)
+        self._whole = np.asarray(
+            cv2.dilate(cv2.medianBlur(self._chroma, 3), _KERNEL, iterations=2), dtype=np.float32
+        )
+        self._ground = ground
+
+    def discs(self, own: Mask, noise: float) -> list[Blob]:
+        """Return what falls apart where less than half of a pixel has the colour."""
+        behind = self._behind(own)
+        half = np.asarray(own & (2.0 * (self._chroma - behind) > self._whole - behind))
+        count, labels = cv2.connectedComponents(half.astype(np.uint8), connectivity=4)
+        found = []
+        for index in range(1, count):
+            disc = np.asarray(labels == index, dtype=np.uint8)
+            if int(disc.sum()) >= LEAST_PIXELS:
+                others = np.asarray((labels > 0) & (disc == 0))
+                blob = self._measure(disc, others, noise)
+                if blob is not None:
+                    found.append(blob)
+        return found
+
+    def _behind(self, own: Mask) -> float:
+        """Return the colour of the plate around a patch."""
+        near = cv2.dilate(own, _KERNEL, iterations=EDGE_PIXELS) > 0
+        far = cv2.dilate(own, _KERNEL, iterations=EDGE_PIXELS + RING_PIXELS) > 0
+        return float(np.median(self._chroma[far & ~near])) if np.any(far & ~near) else 0.0
+
+    def _measure(self, own: Mask, others: NDArray[np.bool_], noise: float) -> Blob | None:
+        disc = (cv2.dilate(own, _KERNEL, iterations=EDGE_PIXELS) > 0) & ~others
+        behind = self._behind(own)
+        full = self._whole[disc] - behind
+        area = self._ground.area[self.part][disc]
+        if full.min() <= 0.0 or not np.all(np.isfinite(area)):
+            return None
+        # The whole pixels count alike, so that the rim of a shadow on the disc does not draw its
+        # centre.
+        inner = cv2.erode(own, _KERNEL)[disc] > 0
+        cover = np.clip((self._chroma[disc] - behind) / full, 0.0, 1.0)
+        share = np.where(inner, 1.0, cover) * area
+        total = float(share.sum())
+        x = self._ground.x[self.part][disc].astype(float)
+        y = self._ground.y[self.part][disc].astype(float)
+        centre_x, centre_y = float(share @ x) / total, float(share @ y) / total
+        x -= centre_x
+        y -= centre_y
+        xx, xy, yy = (float(share @ part) / total for part in (x * x, x * y, y * y))
+        middle, half = (xx + yy) / 2.0, math.hypot((xx - yy) / 2.0, xy)
+        # What noise of the pixels does to a weighted mean; max - min has that of two of them.
+        spread = np.where(inner, 0.0, math.sqrt(2.0) * noise / full * area)
+        variance = float(np.sum(spread**2 * (x * x + y * y))) / 2.0 / total**2
+        radius = math.sqrt(total / math.pi)
+        return Blob(
+            (centre_x, centre_y),
+            variance,
+            radius,
+            math.sqrt((middle + half) / max(middle - half, 1e-12)),
+            math.sqrt(float(area.mean())) / radius,
+            behind / float(np.median(self._whole[own > 0])),
+            self.at_border,
+        )

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tablerunner.config import Config, parameter
-from tablerunner.geometry.angles import wrap
 
 Array = NDArray[np.float64]
 
@@ -62,7 +61,12 @@ def course(before: ArrayLike, after: ArrayLike) -> Array:
 
 
 def course_variance(
-    before: float, after: float, distance: float, dt_s: float, turn_rate: float
+    before: float,
+    after: float,
+    distance: float,
+    dt_s: float,
+    turn_rate: float,
+    lever: float = 0.0,
 ) -> float:
     """Return the variance of a course as a heading [rad^2].
 
@@ -76,5 +80,8 @@ def course_variance(
         Time between them [s].
     turn_rate : float
         Deviation of the turn rate [rad/s].
+    lever : float
+        How far ahead of base_link the places are taken [m]: turning moves them aside.
     """
-    return min((before + after) / distance**2 + (turn_rate * dt_s / 2.0) ** 2, wrap(math.pi) ** 2)
+    lag = turn_rate * dt_s * (0.5 + abs(lever) / distance)
+    return min((before + after) / distance**2 + lag**2, math.pi**2)

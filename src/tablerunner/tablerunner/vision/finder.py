@@ -23,7 +23,7 @@ AT_BORDER = 'marker at the border of the picture'
 RIVAL = 0.5
 """A second marker of a colour makes the first doubtful from this share of its confidence."""
 
-NEAR = 1.6
+NEAR = 2.0
 """How far beyond the tolerance a patch is still measured, as a factor."""
 
 
@@ -129,7 +129,8 @@ class MarkerFinder:
         config = self.config
         offs = (
             (blob.radius / radius - 1.0) / config.size_tolerance,
-            (blob.elongation - 1.0) / config.roundness_tolerance,
+            # A disc of few pixels is never quite round.
+            (blob.elongation - 1.0) / (config.roundness_tolerance + blob.grain**2),
             blob.surround / config.plate_darkness,
         )
         if any(abs(off) > 1.0 for off in offs):

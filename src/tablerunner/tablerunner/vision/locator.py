@@ -118,7 +118,7 @@ class CeilingLocator:
         heading = float(course((last.pose.x, last.pose.y), (now.pose.x, now.pose.y)))
         # The share of the variance that the unknown direction of the mounting has is known now.
         place = float(now.covariance[0, 0]) - disc_x**2 / 2.0
-        variance = course_variance(place, place, distance, dt_s, config.turn_rate)
+        variance = course_variance(place, place, distance, dt_s, config.turn_rate, disc_x)
         cos, sin = math.cos(heading), math.sin(heading)
         pose = Pose2(now.pose.x - disc_x * cos, now.pose.y - disc_x * sin, heading)
         lever = np.array([disc_x * sin, -disc_x * cos, 1.0])

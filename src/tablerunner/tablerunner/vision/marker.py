@@ -70,21 +70,23 @@ class MarkerConfig(Config):
         dynamic=True,
     )
     size_tolerance: float = parameter(
-        0.25,
+        0.1,
         description='How far the radius of a disc may be off, as a share of it',
         above=0.0,
         high=1.0,
         dynamic=True,
     )
     roundness_tolerance: float = parameter(
-        0.3,
-        description='How much longer than wide a disc may seem, as a share',
+        0.1,
+        description=(
+            'How much longer than wide a disc may seem, as a share; of few pixels it may seem more'
+        ),
         above=0.0,
         high=2.0,
         dynamic=True,
     )
     spacing_tolerance: float = parameter(
-        0.1,
+        0.05,
         description='How far the distance of the two discs may be off, as a share of it',
         above=0.0,
         high=1.0,
