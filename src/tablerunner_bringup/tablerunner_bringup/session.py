@@ -93,7 +93,7 @@ class Session:
         self._progress = progress
         self._interrupts = interrupts
         self._supervisor = Supervisor(_LIMITS)
-        self._specs = nodes_of(options)
+        self._specs = nodes_of(options, scenario)
         self._stack = contextlib.ExitStack()
         self._domain: int | None = None
         self._up_at = time.monotonic()

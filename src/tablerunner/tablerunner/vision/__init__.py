@@ -13,13 +13,15 @@ from tablerunner.vision.ceiling_camera import (
     to_room,
 )
 from tablerunner.vision.course import CourseConfig, course, course_variance
-from tablerunner.vision.finder import MarkerFinder, Sighting
+from tablerunner.vision.finder import UNSEEN, MarkerFinder, Sighting
 from tablerunner.vision.lens import distort, undistort
 from tablerunner.vision.locator import CeilingLocator, LocatorConfig, Observation
 from tablerunner.vision.marker import MarkerConfig
+from tablerunner.vision.overlay import draw_overlay
 from tablerunner.vision.picture import picture_fault
 
 __all__ = [
+    'UNSEEN',
     'CameraMount',
     'CeilingCamera',
     'CeilingLocator',
@@ -32,6 +34,7 @@ __all__ = [
     'course',
     'course_variance',
     'distort',
+    'draw_overlay',
     'height_corrected',
     'picture_fault',
     'to_room',

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablerunner.config import Config, parameter
+from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.stream import Order, StampOrder
 from tablerunner.types import ImageSample, Lens, PoseSample, Refusal, seconds
@@ -31,6 +32,16 @@ class LocatorConfig(Config):
         factory=CourseConfig, description='The heading of markers that show none'
     )
 
+    def check(self) -> None:
+        """Refuse markers that do not hang below the camera."""
+        for index, height in enumerate(self.marker.heights):
+            if height >= self.mount.height:
+                raise ConfigError(
+                    f'marker.heights[{index}]',
+                    height,
+                    f'below the camera, which hangs at {self.mount.height:g} m',
+                )
+
 
 @dataclass(frozen=True, slots=True)
 class Observation:
@@ -50,13 +61,7 @@ class Observation:
 
 
 class CeilingLocator:
-    """Looks for markers in each picture, and remembers their last places for the course.
-
-    Raises
-    ------
-    ConfigError
-        A marker is not below the camera.
-    """
+    """Looks for markers in each picture, and remembers their last places for the course."""
 
     def __init__(self, config: LocatorConfig, lens: Lens) -> None:
         self.config = config
