@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
+from tablerunner.experiments.camera_run import run_camera
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
 from tablerunner.experiments.lias import run_lias
 from tablerunner.experiments.liu2023 import run_liu2023
@@ -22,6 +23,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'sun2019': run_sun2019,
         'liu2023': run_liu2023,
         'nlos': run_nlos,
+        'ceiling_camera': run_camera,
     }
 )
 
