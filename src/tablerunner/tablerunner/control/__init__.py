@@ -4,12 +4,14 @@ from tablerunner.control.braking import largest_speed, stopping_distance
 from tablerunner.control.controller import Controller, Drive
 from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
 from tablerunner.control.floor_map import Disc, FloorMap
-from tablerunner.control.follower import FollowerConfig, PurePursuit
+from tablerunner.control.follower import PurePursuit
+from tablerunner.control.follower_config import FollowerConfig
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.mission import Mission
 from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner, PlannerConfig
+from tablerunner.control.registry import CONTROLLERS, ControllerSettings, make_controller
 from tablerunner.control.room import (
     floor_map,
     home_of,
@@ -26,11 +28,10 @@ from tablerunner.control.safety import (
 )
 from tablerunner.control.safety_config import SafetyConfig
 
-CONTROLLERS = ('pure_pursuit',)  # names of the path controllers; 'fuzzy' joins later
-
 __all__ = [
     'CONTROLLERS',
     'Controller',
+    'ControllerSettings',
     'Destination',
     'Disc',
     'Drive',
@@ -55,6 +56,7 @@ __all__ = [
     'home_of',
     'largest_speed',
     'limits_within',
+    'make_controller',
     'make_planner',
     'sensor_mounts',
     'stopping_distance',

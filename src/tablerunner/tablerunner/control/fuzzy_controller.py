@@ -14,7 +14,7 @@ import numpy as np
 from tablerunner.config import Config, parameter
 from tablerunner.control.contour import ContourConfig, ContourNavigator, Mode
 from tablerunner.control.controller import Drive
-from tablerunner.control.follower import FollowerConfig
+from tablerunner.control.follower_config import FollowerConfig
 from tablerunner.control.fuzzy.reactive import ReactiveConfig, ReactiveController
 from tablerunner.control.fuzzy.readings import Readings
 from tablerunner.control.fuzzy.track_keeper import TrackConfig, TrackKeeper
@@ -99,6 +99,12 @@ class FuzzyController:
     def hear(self, readings: Readings) -> None:
         """Take what the sensors hear now; counts for the next step only."""
         self._readings = readings
+
+    def configure(self, config: FollowerConfig, limits: VelocityLimits) -> None:
+        """Use other settings from now on."""
+        self.ends = config
+        self.limits = limits
+        self._navigator.reactive.limits = limits
 
     def follow(self, path: Path) -> None:
         """Take a new path; the velocity carries on from the last one."""
