@@ -75,8 +75,10 @@ class Updated(NamedTuple):
     mean : ndarray, shape (n, d)
     whitened : ndarray, shape (n, d)
         The same as y of m + L y.
-    factor : ndarray, shape (n, d, d)
-        Lower triangular C: C C' is the inverse covariance of y.
+    spread : ndarray, shape (n, d, d)
+        B: B B' is the covariance of y.
+    log_size : ndarray, shape (n,)
+        Log of the determinant of B.
     cost : ndarray, shape (n,)
         V at the mean.
     first_cost : ndarray, shape (n,)
@@ -89,14 +91,22 @@ class Updated(NamedTuple):
 
     mean: Matrix
     whitened: Matrix
-    factor: Array
+    spread: Array
+    log_size: Vector
     cost: Vector
     first_cost: Vector
     converged: NDArray[np.bool_]
     steps: NDArray[np.intp]
 
 
-def update(mean: Matrix, root: Array, look: Look, noise: Matrix, iteration: Iteration) -> Updated:
+def update(
+    mean: Matrix,
+    root: Array,
+    look: Look,
+    noise: Matrix,
+    iteration: Iteration,
+    first: tuple[Matrix, Array] | None = None,
+) -> Updated:
     """Return the Gaussian that an EKF, IEKF or LM-IEKF makes of each prior.
 
     Parameters
@@ -109,11 +119,13 @@ def update(mean: Matrix, root: Array, look: Look, noise: Matrix, iteration: Iter
     noise : ndarray, shape (m, m)
         R, the same for all.
     iteration : Iteration
+    first : tuple, optional
+        What `look` says at the means, if that is known already.
     """
     count, size = mean.shape
     whiten = np.linalg.inv(np.linalg.cholesky(noise)).T
     everyone = np.arange(count)
-    offset, slope = _whitened(look, mean, everyone, root, whiten)
+    offset, slope = _whitened(first or look(mean, everyone), root, whiten)
     state = _State(np.zeros((count, size)), offset, slope, np.sum(offset**2, axis=1))
     first_cost = state.cost.copy()
     metric = np.swapaxes(root, -1, -2) @ root if iteration.damped else None
@@ -121,16 +133,16 @@ def update(mean: Matrix, root: Array, look: Look, noise: Matrix, iteration: Iter
     converged = np.zeros(count, dtype=bool)
     active = everyone
     for _ in range(iteration.steps):
-        curvature = _curvature(state.slope[active])
-        pull = np.einsum('kmd,km->kd', state.slope[active], state.offset[active])
-        pull -= state.y[active]
-        bent = curvature
+        here = state.slope[active]
+        pull = np.einsum('kmd,km->kd', here, state.offset[active]) - state.y[active]
         if metric is not None and damping[active].any():
-            bent = curvature + damping[active, None, None] * metric[active]
-        step = np.linalg.solve(bent, pull[..., None])[..., 0]
+            bent = _curvature(here) + damping[active, None, None] * metric[active]
+            step = np.linalg.solve(bent, pull[..., None])[..., 0]
+        else:
+            step = _solved(here, pull)
         tried = state.y[active] + step
         place = mean[active] + np.einsum('kij,kj->ki', root[active], tried)
-        offset, slope = _whitened(look, place, active, root[active], whiten)
+        offset, slope = _whitened(look(place, active), root[active], whiten)
         cost = np.sum(tried**2, axis=1) + np.sum(offset**2, axis=1)
         if iteration.steps == 1:
             slope = state.slope  # an EKF linearises at the prior, its covariance too
@@ -139,20 +151,37 @@ def update(mean: Matrix, root: Array, look: Look, noise: Matrix, iteration: Iter
         better = np.ones(len(active), dtype=bool)
         if metric is not None:
             better = cost <= state.cost[active]
-            damping[active] = _damping(damping[active], better, curvature, metric[active])
+            damping[active] = _damping(damping[active], better, here, metric[active])
         state.take(active, better, tried, offset, slope, cost)
         # A short step that is no better has met the rounding of V: there is nothing below.
         converged[active] = short
         active = active[~short]
         if not len(active):
             break
-    factor: Array = np.asarray(np.linalg.cholesky(_curvature(state.slope)), dtype=float)
+    spread, log_size = _spread(state.slope)
     found = mean + np.einsum('kij,kj->ki', root, state.y)
-    return Updated(found, state.y, factor, state.cost, first_cost, converged, steps)
+    return Updated(found, state.y, spread, log_size, state.cost, first_cost, converged, steps)
 
 
-def drawn(mean: Matrix, root: Array, updated: Updated, noise: Matrix) -> tuple[Matrix, Vector]:
-    """Return draws from the updated Gaussians, and log prior less log proposal of each.
+class Drawn(NamedTuple):
+    """Draws from updated Gaussians.
+
+    Attributes
+    ----------
+    states : ndarray, shape (n, d)
+    whitened : ndarray, shape (n, d)
+        The same as y of m + L y.
+    log_ratio : ndarray, shape (n,)
+        Log prior less log proposal.
+    """
+
+    states: Matrix
+    whitened: Matrix
+    log_ratio: Vector
+
+
+def drawn(mean: Matrix, root: Array, updated: Updated, noise: Matrix) -> Drawn:
+    """Return draws from the updated Gaussians, with their ratio of prior and proposal.
 
     Parameters
     ----------
@@ -162,18 +191,15 @@ def drawn(mean: Matrix, root: Array, updated: Updated, noise: Matrix) -> tuple[M
     noise : ndarray, shape (n, d)
         Standard normal.
     """
-    # y = y* + C'^-1 e; the normalising constants and |L| are in both densities.
-    inverse = np.linalg.inv(updated.factor)
-    y = updated.whitened + np.einsum('kji,kj->ki', inverse, noise)
-    volume = np.sum(np.log(np.diagonal(updated.factor, axis1=1, axis2=2)), axis=1)
-    ratio = 0.5 * np.sum(noise**2, axis=1) - 0.5 * np.sum(y**2, axis=1) - volume
-    return mean + np.einsum('kij,kj->ki', root, y), ratio
+    # y = y* + B e; the normalising constants and |L| are in both densities.
+    y = updated.whitened + np.einsum('kij,kj->ki', updated.spread, noise)
+    ratio = 0.5 * np.sum(noise**2, axis=1) - 0.5 * np.sum(y**2, axis=1) + updated.log_size
+    return Drawn(mean + np.einsum('kij,kj->ki', root, y), y, ratio)
 
 
 def covariance_of(root: Array, updated: Updated) -> Array:
     """Return the posterior covariances, shape (n, d, d)."""
-    inverse = np.linalg.inv(updated.factor)
-    half = root @ np.swapaxes(inverse, -1, -2)
+    half = root @ updated.spread
     return np.asarray(half @ np.swapaxes(half, -1, -2))
 
 
@@ -198,23 +224,45 @@ class _State:
         self.slope[into], self.cost[into] = slope[better], cost[better]
 
 
-def _whitened(
-    look: Look, place: Matrix, rows: Rows, root: Array, whiten: Matrix
-) -> tuple[Matrix, Array]:
+def _whitened(seen: tuple[Matrix, Array], root: Array, whiten: Matrix) -> tuple[Matrix, Array]:
     """Return R^-1/2 (z - h) and R^-1/2 H L."""
-    offset, slope = look(place, rows)
-    return offset @ whiten, np.swapaxes(whiten, 0, 1) @ (slope @ root)
+    offset, slope = seen
+    return offset @ whiten, whiten.T @ (slope @ root)
 
 
 def _curvature(slope: Array) -> Array:
-    """Return I + (H L)' R^-1 (H L)."""
+    """Return I + V V', with V' = R^-1/2 H L."""
     return np.asarray(np.eye(slope.shape[-1]) + np.swapaxes(slope, -1, -2) @ slope)
 
 
-def _damping(
-    damping: Vector, better: NDArray[np.bool_], curvature: Array, metric: Array
-) -> Vector:
-    least = 1e-3 * _trace(curvature) / np.maximum(_trace(metric), 1e-300)
+def _solved(slope: Array, pull: Matrix) -> Matrix:
+    """Return (I + V V')^-1 pull."""
+    if slope.shape[1] == 1:  # one number: Sherman and Morrison, without any matrix
+        v = slope[:, 0]
+        share = np.sum(v * pull, axis=1) / (1.0 + np.sum(v * v, axis=1))
+        return np.asarray(pull - share[:, None] * v)
+    return np.asarray(np.linalg.solve(_curvature(slope), pull[..., None])[..., 0])
+
+
+def _spread(slope: Array) -> tuple[Array, Vector]:
+    """Return B of B B' = (I + V V')^-1, and the log of its determinant."""
+    if slope.shape[1] == 1:
+        v = slope[:, 0]
+        square = np.sum(v * v, axis=1)
+        # (I + v v')^-1/2 = I - c v v' with c = (1 - 1/sqrt(1 + v'v)) / v'v, written so that a v of
+        # no length is no trouble.
+        grown = np.sqrt(1.0 + square)
+        share = 1.0 / (grown * (grown + 1.0))
+        half = np.eye(slope.shape[2]) - (share[:, None] * v)[:, :, None] * v[:, None, :]
+        return half, -np.log(grown)
+    factor = np.linalg.cholesky(_curvature(slope))
+    log_size = -np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
+    return np.swapaxes(np.linalg.inv(factor), -1, -2), np.asarray(log_size)
+
+
+def _damping(damping: Vector, better: NDArray[np.bool_], slope: Array, metric: Array) -> Vector:
+    curved = slope.shape[-1] + np.sum(slope**2, axis=(1, 2))
+    least = 1e-3 * curved / np.maximum(_trace(metric), 1e-300)
     less = np.where(0.1 * damping < least, 0.0, 0.1 * damping)
     return np.where(better, less, np.maximum(10.0 * damping, least))
 

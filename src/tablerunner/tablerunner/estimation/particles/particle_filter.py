@@ -208,12 +208,12 @@ class ParticleFilter:
             return measured - model.expected(states, step), model.slope(states, step)
 
         updated = update(mean, root, look, model.noise, iteration)
-        states, log_ratio = drawn(mean, root, updated, rng.standard_normal(mean.shape))
+        states, _, log_ratio = drawn(mean, root, updated, rng.standard_normal(mean.shape))
         # `drawn` knows the predicted Gaussian for the prior; the model's own takes its place.
         y = np.linalg.solve(root, (states - mean)[..., None])[..., 0]
         gaussian = -0.5 * np.sum(y**2, axis=1) - np.linalg.slogdet(root)[1]
         gaussian -= 0.5 * mean.shape[1] * np.log(2.0 * np.pi)
-        log_ratio += model.log_motion(states, cloud.states, step) - gaussian
+        log_ratio = log_ratio + model.log_motion(states, cloud.states, step) - gaussian
         moved = Cloud(states, covariance_of(root, updated), cloud.log_weights)
         worse = float(np.mean(updated.cost > updated.first_cost * (1.0 + 1e-9)))
         return moved, log_ratio, worse

@@ -180,7 +180,7 @@ def test_draws_have_the_updated_mean_and_covariance():
     root = square_root(covariance)
     updated = update(mean, root, ranges, NOISE, UIEKF)
     noise = np.random.default_rng(0).standard_normal((count, 2))
-    states, _ = drawn(mean, root, updated, noise)
+    states, _, _ = drawn(mean, root, updated, noise)
     expected = covariance_of(root, updated)[0]
     deviations = np.sqrt(np.diagonal(expected))
     # Four deviations of a mean and of a covariance of so many draws.
@@ -200,7 +200,7 @@ def test_weights_make_the_proposal_the_prior_again():
 
     updated = update(mean, root, look, np.array([[2.0]]), EKF)
     noise = np.random.default_rng(1).standard_normal((count, 1))
-    states, ratio = drawn(mean, root, updated, noise)
+    states, _, ratio = drawn(mean, root, updated, noise)
     weights = np.exp(ratio)
     # The proposal's variance is 2/3: weights have a finite variance, and 1 % is four deviations.
     assert weights.mean() == pytest.approx(1.0, abs=0.01)
