@@ -233,6 +233,7 @@ class Estimate(NamedTuple):
     covariance: Matrix  # (n, n)
     twist: tuple[float, float] = (0.0, 0.0)  # forward [m/s] and turn rate [rad/s], last step
     memory: tuple[float, ...] = ()  # running statistics that the estimator keeps for itself
+    carried: object = None  # what else it keeps: the particles of a particle filter
 
     @property
     def pose(self) -> Pose2:
