@@ -20,12 +20,20 @@ class NodeSpec:
     executable: str
     parameters: Callable[[Scenario, RunOptions], dict[str, Any]]
     simulation_only: bool = False
+    needed: Callable[[Scenario], bool] = lambda scenario: True
     remap: tuple[tuple[str, str], ...] = ()
 
 
 NODES: tuple[NodeSpec, ...] = (
     NodeSpec('uwb_driver', 'uwb_driver', 'uwb_driver', parameters.uwb_driver),
     NodeSpec('odom_node', 'odom_node', 'odom_node', parameters.odom_node),
+    NodeSpec(
+        'ceiling_camera',
+        'ceiling_camera',
+        'ceiling_camera',
+        parameters.ceiling_camera,
+        needed=lambda scenario: scenario.camera is not None,
+    ),
     NodeSpec('fusion_node', 'fusion_node', 'fusion_node', parameters.fusion_node),
     NodeSpec('safety_stop', 'nav_controller', 'safety_stop', parameters.safety_stop),
     NodeSpec('nav_controller', 'nav_controller', 'nav_controller', parameters.nav_controller),
@@ -49,6 +57,7 @@ PERSON_DRIVER = NodeSpec(
     remap=tuple(
         (f'uwb/{name}', f'person/{name}') for name in ('exchanges', 'ranges', 'anchors', 'pose')
     ),
+    needed=lambda scenario: bool(scenario.robot.anchors),
 )
 """uwb_driver once more, for the anchors that a robot carries and the tags that people wear."""
 
@@ -56,11 +65,10 @@ COMMANDING = 'nav_controller'
 """The node whose end takes the command away: the safety stop behind it goes to zero on silence."""
 
 
-def nodes_of(options: RunOptions, scenario: Scenario | None = None) -> tuple[NodeSpec, ...]:
-    """Return the nodes of a run: on a real robot none that simulates.
-
-    Where the robot carries anchors there is one more.
-    """
-    carried = scenario is not None and bool(scenario.robot.anchors)
-    specs = (*NODES, PERSON_DRIVER) if carried else NODES
-    return tuple(spec for spec in specs if options.simulated or not spec.simulation_only)
+def nodes_of(options: RunOptions, scenario: Scenario) -> tuple[NodeSpec, ...]:
+    """Return the nodes of a run: on a real robot none that simulates, and what the room needs."""
+    return tuple(
+        spec
+        for spec in (*NODES, PERSON_DRIVER)
+        if (options.simulated or not spec.simulation_only) and spec.needed(scenario)
+    )

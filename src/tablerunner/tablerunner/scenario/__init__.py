@@ -6,12 +6,14 @@ what cannot be.
 
 from tablerunner.scenario.anchor import AnchorPlace
 from tablerunner.scenario.box import Box
+from tablerunner.scenario.camera import Camera, Light
 from tablerunner.scenario.kitchen import Kitchen
 from tablerunner.scenario.outline import Outline
 from tablerunner.scenario.person import Person, PersonTag
 from tablerunner.scenario.robot import (
     AnchorMount,
     DriveLimits,
+    Marker,
     RobotGeometry,
     UltrasonicMount,
 )
@@ -31,10 +33,13 @@ __all__ = [
     'AnchorMount',
     'AnchorPlace',
     'Box',
+    'Camera',
     'DriveLimits',
     'ImuErrors',
     'Kitchen',
+    'Light',
     'MagneticErrors',
+    'Marker',
     'Outline',
     'Person',
     'PersonTag',

@@ -32,6 +32,7 @@ def check_scenario(scenario: Scenario) -> None:
     _check_people(scenario)
     _check_tags(scenario)
     _check_routes(scenario)
+    _check_camera(scenario)
 
 
 def _once(field: str, names: Iterable[str], key: str) -> None:
@@ -176,4 +177,21 @@ def _check_routes(scenario: Scenario) -> None:
             radius = scenario.robot.footprint_radius
             _check_clear(
                 scenario, f'routes.{name}[{index}]', np.array([point]), radius, list(point)
+            )
+
+
+def _check_camera(scenario: Scenario) -> None:
+    """Refuse a camera that hangs outside the room, or below what it should see."""
+    if scenario.camera is None:
+        return
+    place = scenario.camera.position
+    if scenario.walls and not _inside_room(scenario, np.array([place[:2]])):
+        raise ConfigError('camera.position', list(place), 'a place inside the outer walls')
+    below = [(person.name, person.height) for person in scenario.people]
+    if scenario.robot.marker is not None:
+        below.append(("the robot's marker", scenario.robot.marker.height))
+    for name, height in below:
+        if height >= place[2]:
+            raise ConfigError(
+                'camera.position[2]', place[2], f'a height above {name} ({height:g} m) [m]'
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import Scenario
 from tablerunner.simulation.bumper import Bumper
+from tablerunner.simulation.camera import CameraFeed
 from tablerunner.simulation.drive import Drive
 from tablerunner.simulation.encoders import Encoders
 from tablerunner.simulation.imu import Imu
@@ -19,6 +20,7 @@ from tablerunner.simulation.truth import Contact, PersonState, RangeTruth, Truth
 from tablerunner.types import (
     NANOSECONDS,
     ExchangeSample,
+    ImageSample,
     ImuSample,
     MagneticSample,
     Refusal,
@@ -40,6 +42,7 @@ Sample = (
     | MagneticSample
     | ExchangeSample
     | UltrasonicSample
+    | ImageSample
     | Truth
     | RangeTruth
     | Contact
@@ -74,6 +77,7 @@ class Simulator:
         self.sonar = Sonar(scenario, stream(seed, 'sonar'))
         self.crowd = Crowd(scenario.people, seed)
         self.bumper = Bumper(scenario.outlines, robot.footprint_radius)
+        self.camera = CameraFeed(scenario, seed, START_NS) if scenario.camera else None
         self._wheels_due = Schedule(1.0 / errors.wheels.rate, START_NS)
         self._imu_due = Schedule(1.0 / errors.imu.rate, START_NS)
         self._magnetic_due = Schedule(1.0 / errors.magnetic.rate, START_NS)
@@ -107,7 +111,7 @@ class Simulator:
         tuple
             What was measured at the new `now_ns`, in a fixed order: contacts and refused commands
             first, then truth and wheels (together), IMU, magnetometer, UWB (the robot's tag, then
-            those that people wear), ultrasonic.
+            those that people wear), ultrasonic, camera.
         """
         samples: list[Sample] = []
         dt_s = seconds(STEP_NS)
@@ -133,6 +137,10 @@ class Simulator:
             samples.extend(_told(*self.tags.exchange(now, self.drive.pose, self.people)))
         if self._sonar_due.is_due(now) and self.scenario.robot.ultrasonics:
             samples.append(self.sonar.fire(now, self.drive.pose, self.people))
+        if self.camera is not None:
+            image = self.camera.step(self.truth, self.people)
+            if image is not None:
+                samples.append(image)
         return tuple(samples)
 
 

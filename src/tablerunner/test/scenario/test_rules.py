@@ -32,6 +32,10 @@ routes:
   tour: [[5.0, 5.0], [8.0, 5.0]]
 robot:
   wheel_radius: 0.06
+  marker: {height: 1.2}
+camera:
+  position: [5.0, 5.0, 3.0]
+  light: {level: 1.0}
 sensors:
   uwb: {range_std: 0.1}
 """
@@ -108,6 +112,30 @@ CASES = {
     'person without a way': ('[[5.0, 1.0], [5.0, 9.0]]', '[]', 'people[0].route', 'one point'),
     'route into a wall': ('[8.0, 5.0]]', '[9.9, 5.0]]', 'routes.tour[1]', 'clear of hull'),
     'route of one point': (', [8.0, 5.0]]', ']', 'routes.tour', 'at least two'),
+    'camera outside': (
+        '[5.0, 5.0, 3.0]',
+        '[-1.0, 5.0, 3.0]',
+        'camera.position',
+        'inside the outer',
+    ),
+    'camera among people': (
+        '5.0, 5.0, 3.0',
+        '5.0, 5.0, 1.6',
+        'camera.position[2]',
+        'above waiter',
+    ),
+    'lens that folds': (
+        '{level: 1.0}',
+        '{level: 1.0}\n  distortion: [-0.5, 0, 0, 0, 0]',
+        'camera.distortion',
+        'spreads rays',
+    ),
+    'disc off its plate': (
+        '{height: 1.2}',
+        '{front_x: 0.2}',
+        'robot.marker.front_x',
+        'on the plate',
+    ),
     'key twice': ('  wheel_radius: 0.06', '  track: 0.3\n  track: 0.3', 'robot.track', 'once'),
 }
 
@@ -184,3 +212,9 @@ def test_rules_refuse_a_file_that_is_no_scenario(tmp_path: Path, text: str, word
 def test_rules_refuse_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r'nowhere\.yaml.*a readable file'):
         load_scenario(tmp_path / 'nowhere.yaml')
+
+
+def test_rules_refuse_a_marker_as_high_as_the_camera(tmp_path: Path) -> None:
+    text = GOOD.replace('marker: {height: 1.2}', 'marker: {height: 3.0}')
+    with pytest.raises(ConfigError, match=r"camera\.position\[2\].*above the robot's marker"):
+        load_text(tmp_path, text)
