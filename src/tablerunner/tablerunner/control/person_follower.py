@@ -327,7 +327,7 @@ class PersonFollower:
             others = without_person(readings, self._mounts, person, config.person_radius)
         target = _from(pose, place)
         aim = self._trail.aim((pose.x, pose.y), place, config.corner_cut)
-        if person is None or self._hears(others, target):
+        if person is None or self._hears(others, target, surely=False):
             self._on_trail = True
         elif aim == place:
             self._on_trail = False
@@ -345,9 +345,13 @@ class PersonFollower:
             wanted = Velocity(0.0, wanted.angular_rad_s)
         return wanted, False
 
-    def _hears(self, others: Readings | None, target: tuple[float, float]) -> bool:
+    def _hears(
+        self, others: Readings | None, target: tuple[float, float], surely: bool = True
+    ) -> bool:
         """Return whether something is heard in the straight way to a target in base_link."""
-        return others is not None and in_the_way(others, self._mounts, target, self.config.notice)
+        if others is None:
+            return False
+        return in_the_way(others, self._mounts, target, self.config.notice, surely)
 
 
 def _seen_at(pose: Pose2, person: PersonSample) -> tuple[float, float]:
