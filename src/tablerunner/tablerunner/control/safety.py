@@ -315,6 +315,13 @@ class SafetyStop:
         speeds = largest_speed(
             ways - approach * heard.ages_s, config.delay, config.deceleration, approach
         )
+        # Who comes nearer, however slowly, may come on: the robot has to stand when he is there.
+        paces = heard.paces_m_s
+        met = largest_speed(
+            gaps - config.margin - paces * heard.ages_s, config.delay, config.deceleration, paces
+        )
+        coming = (paces > 0.0) & (heard.points[:, 0] > 0.0)
+        speeds = np.where(coming, np.minimum(speeds, met), speeds)
         beside = largest_speed(
             gaps * _SLANT - config.side_margin, config.delay, config.deceleration
         )

@@ -305,6 +305,18 @@ def test_person_walking_up_stops_the_robot_before_he_is_there() -> None:
         assert speed == 0.0
 
 
+def test_somebody_who_comes_nearer_slowly_from_ahead_slows_the_robot_in_time() -> None:
+    """At 0.2 m/s by himself, always at the same angle: no wall on the way, but a meeting."""
+    bench = Bench()
+    bench.run(3.0)
+    distance, speed = 1.5, 0.6
+    while distance > 0.1:
+        bench.ranges['ultrasonic_left_front'] = distance
+        speed = bench.step().velocity.linear_m_s
+        distance -= (0.2 + speed * math.cos(0.45)) * 0.05
+    assert speed <= CONFIG.creep_speed
+
+
 @settings(max_examples=60, deadline=None)
 @example([(0.0, 2.3125, 'ultrasonic_front', 0.0)])  # a share that rounds past the limit
 @given(
