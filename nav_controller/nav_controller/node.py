@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
-from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 
@@ -14,27 +13,27 @@ from nav_controller.convert import (
     destinations_from_goal,
     feedback_from_status,
     plan_to_message,
-    safety_from_message,
-    situation_of,
 )
 from nav_controller.deliver_server import DeliverServer
 from nav_controller.params import NavNodeConfig
+from nav_controller.senses import Senses
+from nav_controller.trace import traces_to_message
 from tablerunner.control import (
     Destination,
     Mission,
     MissionState,
     MissionStatus,
-    PurePursuit,
+    configure_controller,
     home_of,
     limits_within,
+    make_controller,
     make_planner,
 )
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.scenario import load_scenario
-from tablerunner.types import OdometrySample, Refusal, Velocity, nanoseconds
+from tablerunner.types import Refusal, Velocity, nanoseconds
 from tablerunner_interfaces.action import Deliver
 from tablerunner_ros.clocks import now_ns
-from tablerunner_ros.conversions.odometry import odometry_from_message
 from tablerunner_ros.conversions.pose import goal_from_message, path_from_message
 from tablerunner_ros.conversions.velocity import velocity_to_twist, velocity_to_twist_stamped
 from tablerunner_ros.diagnostics import ERROR, WARN, Diagnostics, Report
@@ -42,7 +41,7 @@ from tablerunner_ros.parameters import declare_config
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.spin import spin_node
 
-POSE, GOAL, WAYPOINTS, DELIVER = 'odometry/filtered', 'goal_pose', 'waypoints', 'deliver'
+GOAL, WAYPOINTS, DELIVER, TRACE = 'goal_pose', 'waypoints', 'deliver', 'fuzzy_trace'
 
 
 class NavNode(Node):
@@ -53,42 +52,33 @@ class NavNode(Node):
         self._config = config = declare_config(self, NavNodeConfig, on_change=self._configure)
         self._scenario = scenario = load_scenario(config.scenario)
         limits = limits_within(config.limits, scenario.robot.limits)
-        self._controller = PurePursuit(config.follower, limits)
+        self._controller = make_controller(
+            config.controller,
+            limits,
+            scenario.robot,
+            config.controllers,
+            config.ultrasonic_frames,
+        )
+        self._controller.explain(config.publish_trace)
         self._planner = make_planner(scenario, config.planner)
         self._mission = Mission(config.mission, self._planner, self._controller, home_of(scenario))
-        self._sample: OdometrySample | None = None
-        self._safety = (False, False, None)  # blocked, held, obstacle
         self._status: MissionStatus = self._mission.status
         self._plan_shown: object = None
         self._feedback_due = 0
         kind = TwistStamped if config.twist_stamped else Twist
         self._velocity = self.create_publisher(kind, 'cmd_vel_nav', qos_for('cmd_vel_nav'))
         self._plan = self.create_publisher(PathMessage, 'plan', qos_for('plan'))
+        self._trace = self.create_publisher(DiagnosticArray, TRACE, qos_for(TRACE))
         self._diagnostics = Diagnostics(self)
-        self._diagnostics.watch(POSE, config.mission.pose_timeout)
+        self._senses = Senses(self, config, self._diagnostics)
         self._diagnostics.describe(self._describe)
         self._deliver = DeliverServer(self, self._begin, self._mission.cancel)
         for type_, topic, callback in (
-            (Odometry, POSE, self._on_pose),
-            (DiagnosticStatus, 'safety_state', self._on_safety),
             (PoseStamped, GOAL, self._on_goal),
             (PathMessage, WAYPOINTS, self._on_waypoints),
         ):
             self.create_subscription(type_, topic, callback, qos_for(topic, subscriber=True))
         self.create_timer(1.0 / config.control_rate, self._on_timer)
-
-    def _on_pose(self, message: Odometry) -> None:
-        sample = odometry_from_message(
-            message, self._config.map_frame, self._config.base_frame, POSE
-        )
-        if isinstance(sample, Refusal):
-            self._diagnostics.refuse(sample)
-            return
-        self._diagnostics.take(POSE, sample.stamp)
-        self._sample = sample
-
-    def _on_safety(self, message: DiagnosticStatus) -> None:
-        self._safety = safety_from_message(message)
 
     def _on_goal(self, message: PoseStamped) -> None:
         pose = goal_from_message(message, self._config.map_frame, GOAL)
@@ -142,10 +132,13 @@ class NavNode(Node):
 
     def _on_timer(self) -> None:
         stamp = now_ns(self)
-        situation = situation_of(stamp, self._sample, *self._safety)
+        situation = self._senses.situation(stamp)
+        self._controller.hear(self._senses.readings(stamp))
         velocity, status = self._mission.step(situation)
         self._status = status
         self._send(velocity, stamp)
+        if self._controller.traces:
+            self._trace.publish(traces_to_message(self._controller.traces, stamp))
         for event in status.events:
             self.get_logger().info(event)
         if status.path is not self._plan_shown:
@@ -167,7 +160,8 @@ class NavNode(Node):
     def _configure(self, config: NavNodeConfig) -> None:
         self._config = config
         limits = limits_within(config.limits, self._scenario.robot.limits)
-        self._controller.configure(config.follower, limits)
+        configure_controller(self._controller, limits, config.controllers)
+        self._controller.explain(config.publish_trace)
         self._planner = self._planner.configured(config.planner)
         self._mission.configure(config.mission, self._planner)
 

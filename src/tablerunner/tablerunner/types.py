@@ -187,8 +187,7 @@ class Velocity:
     angular_rad_s: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(NamedTuple):
     """What an estimator believes at one stamp.
 
     The first three states are always x, y [m] and heading [rad] of base_link in map; what follows

@@ -71,6 +71,7 @@ TOPICS: dict[str, TopicQos] = {
     'plan': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
     'fusion_state': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
     'safety_state': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
+    'fuzzy_trace': _RELIABLE_10,
     'cmd_vel_nav': _RELIABLE_1,
     'cmd_vel': _RELIABLE_1,
     'ground_truth': _RELIABLE_10,

@@ -12,6 +12,7 @@ import typer
 from tablerunner.cli.calibrate import calibrate_app
 from tablerunner.cli.compare import compare
 from tablerunner.cli.convert import convert_app
+from tablerunner.cli.drive_test import drive_test
 from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
 from tablerunner.cli.explain_rule import explain_rule
 from tablerunner.cli.info import info
@@ -43,6 +44,7 @@ def make_app() -> typer.Typer:
     app.command()(tune)
     app.command()(reproduce)
     app.command()(compare)
+    app.command()(drive_test)
     app.command()(stop_test)
     app.command()(explain_rule)
     app.add_typer(convert_app, name='convert')

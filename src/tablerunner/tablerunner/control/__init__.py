@@ -1,15 +1,26 @@
 """Driving: planning, following a path, missions, and the safety stop; free of estimation."""
 
+from tablerunner.control.battery import Battery, BatteryConfig
 from tablerunner.control.braking import largest_speed, stopping_distance
 from tablerunner.control.controller import Controller, Drive
+from tablerunner.control.delivery_queue import Delivery, DeliveryQueue
+from tablerunner.control.delivery_store import DeliveryStore
 from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
+from tablerunner.control.dispatcher import Dispatcher, DispatchStep, Ended
 from tablerunner.control.floor_map import Disc, FloorMap
-from tablerunner.control.follower import FollowerConfig, PurePursuit
+from tablerunner.control.follower import PurePursuit
+from tablerunner.control.follower_config import FollowerConfig
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.mission import Mission
 from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner, PlannerConfig
+from tablerunner.control.registry import (
+    CONTROLLERS,
+    ControllerSettings,
+    configure_controller,
+    make_controller,
+)
 from tablerunner.control.room import (
     floor_map,
     home_of,
@@ -25,15 +36,23 @@ from tablerunner.control.safety import (
     SafetyStop,
 )
 from tablerunner.control.safety_config import SafetyConfig
-
-CONTROLLERS = ('pure_pursuit',)  # names of the path controllers; 'fuzzy' joins later
+from tablerunner.control.tour import Tour
 
 __all__ = [
     'CONTROLLERS',
+    'Battery',
+    'BatteryConfig',
     'Controller',
+    'ControllerSettings',
+    'Delivery',
+    'DeliveryQueue',
+    'DeliveryStore',
     'Destination',
     'Disc',
+    'DispatchStep',
+    'Dispatcher',
     'Drive',
+    'Ended',
     'FloorMap',
     'FollowerConfig',
     'Localisation',
@@ -50,11 +69,14 @@ __all__ = [
     'SafetyState',
     'SafetyStop',
     'Situation',
+    'Tour',
     'VelocityLimits',
+    'configure_controller',
     'floor_map',
     'home_of',
     'largest_speed',
     'limits_within',
+    'make_controller',
     'make_planner',
     'sensor_mounts',
     'stopping_distance',

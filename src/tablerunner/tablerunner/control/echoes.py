@@ -87,7 +87,7 @@ class Heard:
         flat at a slant ahead may seem to.
     beside : ndarray of bool, shape (n,)
         Whether a sensor heard it that looks to the side.
-    sensors : tuple of str
+    sensors : ndarray of str, shape (n,)
     """
 
     points: Vector
@@ -96,7 +96,7 @@ class Heard:
     nearing: NDArray[np.bool_]
     paces_m_s: Vector
     beside: NDArray[np.bool_]
-    sensors: tuple[str, ...]
+    sensors: NDArray[np.str_]
 
 
 class EchoMemory:
@@ -117,6 +117,7 @@ class EchoMemory:
         self.mounts = dict(mounts)
         self.times = times
         self._names = tuple(mounts)
+        self._names_by_number = np.array(self._names)
         self._beside = np.array(
             [abs(difference(mount.heading, 0.0)) >= _SIDE_RAD for mount in mounts.values()]
         )
@@ -309,5 +310,5 @@ class EchoMemory:
             newest & nearing[self._sensors],
             np.where(newest, paces[self._sensors], 0.0),
             self._beside[self._sensors],
-            tuple(self._names[number] for number in self._sensors),
+            self._names_by_number[self._sensors],
         )

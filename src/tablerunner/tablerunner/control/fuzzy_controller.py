@@ -14,9 +14,10 @@ import numpy as np
 from tablerunner.config import Config, parameter
 from tablerunner.control.contour import ContourConfig, ContourNavigator, Mode
 from tablerunner.control.controller import Drive
-from tablerunner.control.follower import FollowerConfig
+from tablerunner.control.follower_config import FollowerConfig
 from tablerunner.control.fuzzy.reactive import ReactiveConfig, ReactiveController
 from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.fuzzy.trace import Trace
 from tablerunner.control.fuzzy.track_keeper import TrackConfig, TrackKeeper
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.path import Path
@@ -87,6 +88,8 @@ class FuzzyController:
         self._path: Path | None = None
         self._readings: Readings | None = None
         self._velocity = Velocity()
+        self._explained = False
+        self._traces: tuple[Trace, ...] = ()
         self._begin()
 
     def _begin(self) -> None:
@@ -100,6 +103,30 @@ class FuzzyController:
         """Take what the sensors hear now; counts for the next step only."""
         self._readings = readings
 
+    def configure(self, config: FollowerConfig, limits: VelocityLimits) -> None:
+        """Use other settings from now on."""
+        self.ends = config
+        self.limits = limits
+        self._navigator.reactive.limits = limits
+
+    def tune(self, track: TrackConfig, reactive: ReactiveConfig) -> None:
+        """Use other settings of the rule bases' surroundings from now on."""
+        self._keeper.config = track
+        self._navigator.reactive.config = reactive
+
+    def explain(self, wanted: bool) -> None:
+        """Keep the reasons of each step from now on, or no longer."""
+        self._explained = self._navigator.traced = wanted
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """What rule bases decided in the last step.
+
+        That of the track while correcting, those of corner and speed on the way round something;
+        empty otherwise, and where `explain` did not ask.
+        """
+        return self._traces
+
     def follow(self, path: Path) -> None:
         """Take a new path; the velocity carries on from the last one."""
         self._path = path
@@ -109,6 +136,7 @@ class FuzzyController:
 
     def halt(self, dt: float) -> Velocity:
         """Return the next velocity of coming to a stand."""
+        self._traces = ()
         self._velocity = self.limits.approach(self._velocity, Velocity(), dt)
         return self._velocity
 
@@ -126,6 +154,7 @@ class FuzzyController:
         if not pose.is_finite:
             raise ValueError('the pose is not finite')
         readings, self._readings = self._readings, None
+        self._traces = ()
         end_x, end_y = path.end
         to_end = math.hypot(end_x - pose.x, end_y - pose.y)
         # On the way round the robot may be far ahead on the path already.
@@ -171,6 +200,7 @@ class FuzzyController:
             self._navigator.go((float(x), float(y)))
         if self._around and readings is not None:
             step = self._navigator.step(readings, pose, dt)
+            self._traces = step.traces
             if step.mode is Mode.UNREACHABLE:
                 self.blocked_by = step.reason
                 return Velocity()
@@ -189,7 +219,9 @@ class FuzzyController:
         braking = math.sqrt(2.0 * ends.approach_deceleration * left)
         speed = min(self.limits.max_speed, max(braking, ends.crawl_speed))
         if len(path.points) > 1 and left > _LAST_M:
-            return self._keeper.step(pose, speed).velocity
+            step = self._keeper.step(pose, speed, self._explained)
+            self._traces = () if step.trace is None else (step.trace,)
+            return step.velocity
         end_x, end_y = path.end
         error = difference(math.atan2(end_y - pose.y, end_x - pose.x), pose.heading)
         if abs(error) > ends.turn_in_place_above:
