@@ -70,6 +70,7 @@ TOPICS: dict[str, TopicQos] = {
     'waypoints': _RELIABLE_10,
     'plan': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
     'fusion_state': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
+    'battery_state': _SENSOR,
     'safety_state': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
     'fuzzy_trace': _RELIABLE_10,
     'cmd_vel_nav': _RELIABLE_1,

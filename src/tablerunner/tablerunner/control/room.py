@@ -13,9 +13,10 @@ from tablerunner.scenario import DriveLimits, RobotGeometry, Scenario
 
 
 def floor_map(scenario: Scenario, resolution: float = 0.05) -> FloorMap:
-    """Return the floor of a room; people are not on it."""
-    solids = tuple(outline.corners for outline in scenario.outlines if outline.is_solid)
-    return FloorMap.build(scenario.obstacle_segments(), solids, (), resolution)
+    """Return the floor of a room as its map has it; people are not on it."""
+    known = scenario.mapped
+    solids = tuple(outline.corners for outline in known.outlines if outline.is_solid)
+    return FloorMap.build(known.obstacle_segments(), solids, (), resolution)
 
 
 def make_planner(scenario: Scenario, config: PlannerConfig | None = None) -> Planner:
