@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 
+from nav_controller.assembly import assemble
 from nav_controller.convert import (
     destinations_from_goal,
     feedback_from_queue,
@@ -26,15 +27,9 @@ from tablerunner.control import (
     DeliveryStore,
     Destination,
     Dispatcher,
-    Mission,
     MissionState,
     MissionStatus,
     Situation,
-    configure_controller,
-    home_of,
-    limits_within,
-    make_controller,
-    make_planner,
 )
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.scenario import load_scenario
@@ -57,17 +52,8 @@ class NavNode(Node):
         super().__init__('nav_controller', **options)
         self._config = config = declare_config(self, NavNodeConfig, on_change=self._configure)
         self._scenario = scenario = load_scenario(config.scenario)
-        limits = limits_within(config.limits, scenario.robot.limits)
-        self._controller = make_controller(
-            config.controller,
-            limits,
-            scenario.robot,
-            config.controllers,
-            config.ultrasonic_frames,
-        )
-        self._controller.explain(config.publish_trace)
-        self._planner = make_planner(scenario, config.planner)
-        self._mission = Mission(config.mission, self._planner, self._controller, home_of(scenario))
+        self._parts = assemble(config, scenario)
+        self._mission = self._parts.mission
         self._battery = Battery(config.battery)
         self._store = DeliveryStore(Path(config.queue_file)) if config.queue_file else None
         self._dispatcher = Dispatcher(
@@ -174,12 +160,12 @@ class NavNode(Node):
     def _on_timer(self) -> None:
         stamp = now_ns(self)
         situation = self._senses.situation(stamp)
-        self._controller.hear(self._senses.readings(stamp))
+        self._mission.hear(self._senses.readings(stamp))
         step = self._dispatcher.step(situation)
         self._status = step.status
         self._outputs.drive(self._follow_or(step.velocity, situation), stamp)
         self._outputs.plan(step.status.path, stamp)
-        self._outputs.explain(self._controller.traces, stamp)
+        self._outputs.explain(self._parts.controller.traces, stamp)
         for event in step.events:
             self.get_logger().info(event)
         for ended in step.ended:
@@ -197,11 +183,7 @@ class NavNode(Node):
 
     def _configure(self, config: NavNodeConfig) -> None:
         self._config = config
-        limits = limits_within(config.limits, self._scenario.robot.limits)
-        configure_controller(self._controller, limits, config.controllers)
-        self._controller.explain(config.publish_trace)
-        self._planner = self._planner.configured(config.planner)
-        self._mission.configure(config.mission, self._planner)
+        self._parts.configure(config)
         self._battery.config = config.battery
         self._follow.configure(config)
 

@@ -14,6 +14,7 @@ from tablerunner.control import (
     MissionConfig,
     PlannerConfig,
     SafetyConfig,
+    SurroundingsConfig,
     VelocityLimits,
 )
 from tablerunner.control.contour import ContourConfig
@@ -71,6 +72,10 @@ class NavNodeConfig(Config):
         factory=DetourConfig, description='When it leaves the path for that'
     )
     planner: PlannerConfig = parameter(factory=PlannerConfig, description='What a good way is')
+    surroundings: SurroundingsConfig = parameter(
+        factory=SurroundingsConfig,
+        description='How what the sensors find beside the map is weighed',
+    )
     mission: MissionConfig = parameter(
         factory=MissionConfig, description='How patient a mission is'
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -11,7 +12,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Range
 from std_srvs.srv import Trigger
 
-from nav_controller.convert import localisation_of, safety_to_message
+from nav_controller.convert import is_lost, localisation_of, safety_to_message
 from nav_controller.params import SafetyNodeConfig
 from tablerunner.control import (
     Localisation,
@@ -58,7 +59,7 @@ class SafetyNode(Node):
         self._configure(config)
         self._command: Velocity | None = None
         self._command_stamp = 0
-        self._localisation = Localisation()
+        self._localisation, self._lost = Localisation(), False
         self._motion: Velocity | None = None
         self._clock_at, self._clock_seen = 0, steady_ns()
         self._decision: SafetyDecision | None = None
@@ -78,6 +79,7 @@ class SafetyNode(Node):
             self._listen(Range, topic, self._on_range)
         self._diagnostics.describe(self._describe)
         self._listen(Odometry, POSE, self._on_pose)
+        self._listen(DiagnosticStatus, 'fusion_state', self._on_fusion)
         self._listen(kind, COMMAND, self._on_command)
         self.create_service(Trigger, 'emergency_stop', self._on_emergency)
         self.create_service(Trigger, 'release', self._on_release)
@@ -118,9 +120,13 @@ class SafetyNode(Node):
         if isinstance(sample, Refusal):
             self._diagnostics.refuse(sample)
             return
-        self._localisation = localisation_of(sample)
+        self._localisation = replace(localisation_of(sample), lost=self._lost)
         self._motion = Velocity(sample.linear_m_s, sample.angular_rad_s)
         self._diagnostics.take(POSE, sample.stamp)
+
+    def _on_fusion(self, message: DiagnosticStatus) -> None:
+        self._lost = is_lost(message)
+        self._localisation = replace(self._localisation, lost=self._lost)
 
     def _on_watch(self) -> None:
         decision = self._decide()
@@ -131,7 +137,7 @@ class SafetyNode(Node):
         now, steady = now_ns(self), steady_ns()
         if now < self._clock_at - NANOSECONDS:
             self._stop.reset()
-            self._command, self._localisation = None, Localisation()
+            self._command, self._localisation = None, Localisation(lost=self._lost)
         if now != self._clock_at:
             self._clock_at, self._clock_seen = now, steady
         fault = ''

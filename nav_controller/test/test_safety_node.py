@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock as RosClock
@@ -82,6 +82,12 @@ def driving(probe: Probe, robot: Any) -> Driver:
     return driver
 
 
+def fusion_state(probe: Probe, state: str) -> None:
+    values = [KeyValue(key='state', value=state), KeyValue(key='pose by', value='fused')]
+    status = DiagnosticStatus(name='fusion_node', message=state, values=values)
+    probe.publish('fusion_state', status)
+
+
 def call(probe: Probe, service: str) -> Trigger.Response:
     client = probe.node.create_client(Trigger, service)
     probe.wait_for(client.service_is_ready, service)
@@ -129,6 +135,23 @@ def test_pose_in_another_frame_is_no_pose(driving: Driver, robot: Any) -> None:
     driving.probe.wait_diagnostic(
         'safety_stop: odometry/filtered', 'refused: not in frame map', lambda n: int(n) > 0
     )
+
+
+def test_robot_that_is_lost_slows_and_stops_until_it_is_found(driving: Driver) -> None:
+    """Localisation says so itself on fusion_state; the pose looks as certain as before."""
+    probe = driving.probe
+    assert probe.set_parameter('safety_stop', 'safety.search_distance', 0.2) == ''
+    probe.speak(DiagnosticStatus, 'fusion_state')
+    probe.connected('fusion_state')
+    fusion_state(probe, 'tracking')
+    assert not driving.stands(0.2)
+    fusion_state(probe, 'lost')
+    driving.wait_speed(lambda speed: speed == pytest.approx(0.2), 'a slower speed')
+    status = driving.wait_words('lost: driven far enough so')
+    assert status.level == DiagnosticStatus.ERROR
+    assert driving.stands(0.3)
+    fusion_state(probe, 'tracking')
+    driving.wait_speed(lambda speed: speed >= 0.299, 'the commanded speed again')
 
 
 def test_uncertain_position_slows_and_stops(driving: Driver, robot: Any) -> None:

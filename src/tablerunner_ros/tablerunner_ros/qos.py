@@ -74,6 +74,7 @@ TOPICS: dict[str, TopicQos] = {
     'goal_pose': _RELIABLE_10,
     'waypoints': _RELIABLE_10,
     'plan': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
+    'fusion_state': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
     'battery_state': _SENSOR,
     'safety_state': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
     'follow_state': TopicQos(reliable=True, depth=1, subscriber_depth=1, latched=True),
