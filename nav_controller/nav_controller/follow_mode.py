@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -14,9 +13,10 @@ from std_srvs.srv import SetBool
 from nav_controller.follow_convert import follow_to_message
 from nav_controller.follow_params import person_of
 from nav_controller.params import NavNodeConfig
-from tablerunner.control import limits_within, sensor_mounts
+from tablerunner.control import Dispatcher, limits_within, sensor_mounts
 from tablerunner.control.fuzzy import Readings
 from tablerunner.control.person_follower import FollowState, FollowStep, PersonFollower
+from tablerunner.errors import MissionError
 from tablerunner.estimation.person_locator import SOURCE, PersonLocator
 from tablerunner.scenario import Scenario
 from tablerunner.types import NANOSECONDS, OdometrySample, Refusal, Velocity, seconds
@@ -45,8 +45,8 @@ class FollowMode:
     scenario : Scenario
         Its robot says where anchors and ultrasonic sensors sit.
     diagnostics : Diagnostics
-    busy : callable
-        Why nobody can be followed now; '' when the node has nothing else to do.
+    dispatcher : Dispatcher
+        What has the robot otherwise: nobody is followed while it has something to do.
     """
 
     def __init__(
@@ -55,12 +55,12 @@ class FollowMode:
         config: NavNodeConfig,
         scenario: Scenario,
         diagnostics: Diagnostics,
-        busy: Callable[[], str],
+        dispatcher: Dispatcher,
     ) -> None:
         self._node = node
         self._scenario = scenario
         self._diagnostics = diagnostics
-        self._busy = busy
+        self._dispatcher = dispatcher
         self._frames = config.odom_frame, config.base_frame
         person = person_of(config.person, scenario.robot)
         self._tag_id = person.tag_id
@@ -86,12 +86,15 @@ class FollowMode:
         """Whether somebody is followed or waited for."""
         return self._follower.is_active
 
-    def stop(self) -> None:
-        """Follow nobody; somebody else drives from now on."""
+    def require_idle(self) -> None:
+        """Raise while somebody is followed.
+
+        Raises
+        ------
+        MissionError
+        """
         if self.is_active:
-            self._follower.stop()
-            self._tell(self._last, FollowStep(Velocity(), self._follower.state))
-        self._velocity = Velocity()
+            raise MissionError(BUSY)
 
     def configure(self, config: NavNodeConfig) -> None:
         """Use other settings from now on; whoever is followed stays so."""
@@ -100,19 +103,24 @@ class FollowMode:
         if self._locator is not None:
             self._locator.configure(person_of(config.person, self._scenario.robot))
 
-    def step(self, stamp: int, readings: Readings, blocked: bool) -> Velocity | None:
-        """Return what to drive; None: nothing is followed and the robot stands."""
+    def step(self, stamp: int, otherwise: Velocity, readings: Readings, blocked: bool) -> Velocity:
+        """Return what to drive: `otherwise` unless somebody is followed.
+
+        A drive home, on request or for the battery, ends the following.
+        """
         if stamp < self._last - NANOSECONDS:  # a bag that was started again
             self._follower.stop()
         dt = min(max(seconds(stamp - self._last), 0.0), _LONGEST_STEP_S)
         self._last = stamp
+        if self._dispatcher.mission.is_busy:
+            self._follower.stop()
+            self._velocity = Velocity()
         odometry, locator = self._odometry, self._locator
-        if locator is None or odometry is None:
-            return None
-        if not self.is_active and self._velocity == Velocity():
+        at_rest = not self.is_active and self._velocity == Velocity()
+        if locator is None or odometry is None or at_rest:
             if self._told[1] not in (None, self._follower.state):
                 self._tell(stamp, FollowStep(Velocity(), self._follower.state))
-            return None
+            return otherwise
         person, why = None, 'odometry is silent'
         if seconds(stamp - odometry.stamp) <= _ODOM_SILENT_S:
             sight = locator.sight(stamp)
@@ -152,10 +160,12 @@ class FollowMode:
             return 'no anchors on the robot: person.anchor_ids, or robot.anchors of the scenario'
         if self._odometry is None:
             return 'no odometry yet'
-        reason = self._busy()
-        if not reason and not self.is_active:
+        mission = self._dispatcher.mission
+        if mission.is_busy or len(self._dispatcher.queue):
+            return f'busy: {mission.status.state.value}'
+        if not self.is_active:
             self._follower.start(now_ns(self._node))
-        return reason
+        return ''
 
     def _on_odometry(self, locator: PersonLocator, message: Odometry) -> None:
         sample = odometry_from_message(message, *self._frames)

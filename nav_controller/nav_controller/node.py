@@ -16,7 +16,7 @@ from nav_controller.convert import (
     feedback_from_status,
 )
 from nav_controller.deliver_server import DeliverServer
-from nav_controller.follow_mode import BUSY, FollowMode
+from nav_controller.follow_mode import FollowMode
 from nav_controller.outputs import Outputs
 from nav_controller.params import NavNodeConfig
 from nav_controller.requests import Requests
@@ -33,7 +33,7 @@ from tablerunner.control import (
 )
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.scenario import load_scenario
-from tablerunner.types import Refusal, Velocity, nanoseconds
+from tablerunner.types import Refusal, nanoseconds
 from tablerunner_interfaces.action import Deliver
 from tablerunner_ros.clocks import now_ns
 from tablerunner_ros.conversions.pose import goal_from_message, path_from_message
@@ -72,7 +72,7 @@ class NavNode(Node):
         self._diagnostics.describe(self._describe)
         self._deliver = DeliverServer(self, self._begin, self._dispatcher.cancel)
         self._requests = Requests(self, self._dispatcher)
-        self._follow = FollowMode(self, config, scenario, self._diagnostics, self._busy)
+        self._follow = FollowMode(self, config, scenario, self._diagnostics, self._dispatcher)
         for type_, topic, callback in (
             (PoseStamped, GOAL, self._on_goal),
             (PathMessage, WAYPOINTS, self._on_waypoints),
@@ -105,31 +105,10 @@ class NavNode(Node):
         )
         self._go(WAYPOINTS, stops)
 
-    def _busy(self) -> str:
-        """Return why nobody can be followed now."""
-        waits = self._mission.is_busy or len(self._dispatcher.queue) > 0
-        return f'busy: {self._status.state.value}' if waits else ''
-
-    def _follow_or(self, velocity: Velocity, situation: Situation) -> Velocity:
-        """Return what following wants, or else what the dispatcher does.
-
-        A drive home, on request or for the battery, ends the following.
-        """
-        if self._mission.is_busy:
-            self._follow.stop()
-            return velocity
-        stamp = situation.stamp
-        wanted = self._follow.step(stamp, self._senses.readings(stamp), situation.blocked)
-        return velocity if wanted is None else wanted
-
-    def _require_idle(self) -> None:
-        if self._follow.is_active:
-            raise MissionError(BUSY)
-
     def _go(self, source: str, stops: tuple[Destination, ...]) -> None:
         """Drive to places for a topic; that replaces what came by topic, never a delivery."""
         try:
-            self._require_idle()
+            self._follow.require_idle()
             self._dispatcher.go(stops, now_ns(self))
         except (MissionError, PlanningError) as error:
             self._refuse(source, str(error))
@@ -142,7 +121,7 @@ class NavNode(Node):
         stamp = now_ns(self)
         try:
             stops = destinations_from_goal(goal, self._scenario, self._config.map_frame)
-            self._require_idle()
+            self._follow.require_idle()
             if not stops:
                 raise MissionError('a delivery needs at least one stop')
             delivery = Delivery(name, self._mission.tour_of(stops, goal.return_home))
@@ -160,10 +139,12 @@ class NavNode(Node):
     def _on_timer(self) -> None:
         stamp = now_ns(self)
         situation = self._senses.situation(stamp)
-        self._mission.hear(self._senses.readings(stamp))
+        readings = self._senses.readings(stamp)
+        self._mission.hear(readings)
         step = self._dispatcher.step(situation)
         self._status = step.status
-        self._outputs.drive(self._follow_or(step.velocity, situation), stamp)
+        velocity = self._follow.step(stamp, step.velocity, readings, situation.blocked)
+        self._outputs.drive(velocity, stamp)
         self._outputs.plan(step.status.path, stamp)
         self._outputs.explain(self._parts.controller.traces, stamp)
         for event in step.events:
