@@ -72,7 +72,9 @@ class NavNode(Node):
             self._planner,
             self._controller,
             home_of(scenario),
-            make_surroundings(scenario, self._planner, frames=config.ultrasonic_frames),
+            make_surroundings(
+                scenario, self._planner, config.surroundings, config.ultrasonic_frames
+            ),
         )
         self._battery = Battery(config.battery)
         self._store = DeliveryStore(Path(config.queue_file)) if config.queue_file else None
