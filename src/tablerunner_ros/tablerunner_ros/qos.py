@@ -61,6 +61,7 @@ TOPICS: dict[str, TopicQos] = {
     'camera/image_raw': _SENSOR,
     'camera/camera_info': _SENSOR,
     'camera/pose': _RELIABLE_10,
+    'camera/debug_image': _SENSOR,
     'odom': _RELIABLE_10,
     'odometry/filtered': _RELIABLE_10,
     'pose': _RELIABLE_10,
