@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 
+from nav_controller.assembly import assemble
 from nav_controller.convert import (
     destinations_from_goal,
     feedback_from_queue,
@@ -25,16 +26,9 @@ from tablerunner.control import (
     DeliveryStore,
     Destination,
     Dispatcher,
-    Mission,
     MissionState,
     MissionStatus,
     Situation,
-    configure_controller,
-    home_of,
-    limits_within,
-    make_controller,
-    make_planner,
-    make_surroundings,
 )
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.scenario import load_scenario
@@ -57,25 +51,8 @@ class NavNode(Node):
         super().__init__('nav_controller', **options)
         self._config = config = declare_config(self, NavNodeConfig, on_change=self._configure)
         self._scenario = scenario = load_scenario(config.scenario)
-        limits = limits_within(config.limits, scenario.robot.limits)
-        self._controller = make_controller(
-            config.controller,
-            limits,
-            scenario.robot,
-            config.controllers,
-            config.ultrasonic_frames,
-        )
-        self._controller.explain(config.publish_trace)
-        self._planner = make_planner(scenario, config.planner)
-        self._mission = Mission(
-            config.mission,
-            self._planner,
-            self._controller,
-            home_of(scenario),
-            make_surroundings(
-                scenario, self._planner, config.surroundings, config.ultrasonic_frames
-            ),
-        )
+        self._parts = assemble(config, scenario)
+        self._mission = self._parts.mission
         self._battery = Battery(config.battery)
         self._store = DeliveryStore(Path(config.queue_file)) if config.queue_file else None
         self._dispatcher = Dispatcher(
@@ -163,7 +140,7 @@ class NavNode(Node):
         self._status = step.status
         self._outputs.drive(step.velocity, stamp)
         self._outputs.plan(step.status.path, stamp)
-        self._outputs.explain(self._controller.traces, stamp)
+        self._outputs.explain(self._parts.controller.traces, stamp)
         for event in step.events:
             self.get_logger().info(event)
         for ended in step.ended:
@@ -181,11 +158,7 @@ class NavNode(Node):
 
     def _configure(self, config: NavNodeConfig) -> None:
         self._config = config
-        limits = limits_within(config.limits, self._scenario.robot.limits)
-        configure_controller(self._controller, limits, config.controllers)
-        self._controller.explain(config.publish_trace)
-        self._planner = self._planner.configured(config.planner)
-        self._mission.configure(config.mission, self._planner)
+        self._parts.configure(config)
         self._battery.config = config.battery
 
     def _describe(self, report: Report) -> None:

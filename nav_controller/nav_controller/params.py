@@ -73,6 +73,10 @@ class NavNodeConfig(Config):
         factory=SurroundingsConfig, description='What is made of echoes that the map does not show'
     )
     planner: PlannerConfig = parameter(factory=PlannerConfig, description='What a good way is')
+    surroundings: SurroundingsConfig = parameter(
+        factory=SurroundingsConfig,
+        description='How what the sensors find beside the map is weighed',
+    )
     mission: MissionConfig = parameter(
         factory=MissionConfig, description='How patient a mission is'
     )
