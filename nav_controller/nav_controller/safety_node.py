@@ -96,6 +96,7 @@ class SafetyNode(Node):
             return
         self._command, self._command_stamp = velocity, now_ns(self)
         self._send(self._decide())
+        self._show()
         self._diagnostics.take(COMMAND, self._command_stamp)
 
     def _on_range(self, message: Range) -> None:
@@ -111,6 +112,7 @@ class SafetyNode(Node):
         decision = self._decide()
         if before is None or decision.velocity.linear_m_s < before.velocity.linear_m_s:
             self._send(decision)  # braking does not wait for the next command
+        self._show()
         self._diagnostics.take(f'{ULTRASONIC}/{sample.sensor}', sample.stamp)
 
     def _on_pose(self, message: Odometry) -> None:
@@ -132,6 +134,7 @@ class SafetyNode(Node):
         decision = self._decide()
         if steady_ns() - self._sent_at >= nanoseconds(1.0 / self._config.watch_rate):
             self._send(decision)
+        self._show()
 
     def _decide(self) -> SafetyDecision:
         now, steady = now_ns(self), steady_ns()
@@ -151,7 +154,6 @@ class SafetyNode(Node):
         self._decision = self._stop.step(
             now, self._command, self._command_stamp, self._localisation, motion, fault
         )
-        self._show(self._decision, steady)
         return self._decision
 
     def on_end(self) -> None:
@@ -169,7 +171,11 @@ class SafetyNode(Node):
             message = velocity_to_twist(velocity)
         self._velocity.publish(message)
 
-    def _show(self, decision: SafetyDecision, steady: int) -> None:
+    def _show(self) -> None:
+        """Tell of the last decision: after it is sent, for the wheels come first."""
+        decision, steady = self._decision, steady_ns()
+        if decision is None:
+            return
         shown = (decision.state, decision.reasons)
         changed = shown != self._state_shown
         if changed or steady - self._state_at >= _STATE_PERIOD_NS:
@@ -179,6 +185,7 @@ class SafetyNode(Node):
     def _on_emergency(self, _request: Any, response: Trigger.Response) -> Trigger.Response:
         self._stop.trigger()
         self._send(self._decide())
+        self._show()
         self.get_logger().warning('emergency stop')
         response.success, response.message = True, 'stopped until released'
         return response
