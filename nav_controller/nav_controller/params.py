@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from tablerunner.config import Config, parameter
 from tablerunner.control import (
     CONTROLLERS,
+    BatteryConfig,
     ControllerSettings,
     FollowerConfig,
     MissionConfig,
@@ -70,6 +71,15 @@ class NavNodeConfig(Config):
     planner: PlannerConfig = parameter(factory=PlannerConfig, description='What a good way is')
     mission: MissionConfig = parameter(
         factory=MissionConfig, description='How patient a mission is'
+    )
+    battery: BatteryConfig = parameter(
+        factory=BatteryConfig, description='When the battery counts as low'
+    )
+    queue_file: str = parameter(
+        '', description='File that keeps the deliveries over a restart; empty: none does'
+    )
+    queue_limit: int = parameter(
+        20, description='Most deliveries that are under way or wait', low=1, high=1000
     )
 
     def check(self) -> None:

@@ -1,4 +1,4 @@
-"""What nav_controller hears of the robot: its pose, the safety stop, the ultrasonic sensors."""
+"""What nav_controller hears of the robot: pose, safety stop, ultrasonic sensors, battery."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from sensor_msgs.msg import Range
+from sensor_msgs.msg import BatteryState, Range
 
 from nav_controller.convert import safety_from_message, situation_of
 from nav_controller.params import NavNodeConfig
-from tablerunner.control import Situation
+from tablerunner.control import Battery, Situation
 from tablerunner.control.fuzzy import Readings, UltrasonicRing
 from tablerunner.types import NANOSECONDS, OdometrySample, Refusal
 from tablerunner_ros.clocks import now_ns
@@ -20,7 +20,7 @@ from tablerunner_ros.conversions.ultrasonic import ultrasonic_from_message
 from tablerunner_ros.diagnostics import Diagnostics
 from tablerunner_ros.qos import qos_for
 
-POSE, ULTRASONIC = 'odometry/filtered', 'ultrasonic'
+POSE, ULTRASONIC, BATTERY = 'odometry/filtered', 'ultrasonic', 'battery_state'
 
 
 class Senses:
@@ -31,19 +31,25 @@ class Senses:
     node : Node
     config : NavNodeConfig
     diagnostics : Diagnostics
+    battery : Battery
+        Is told each charge.
     """
 
-    def __init__(self, node: Node, config: NavNodeConfig, diagnostics: Diagnostics) -> None:
+    def __init__(
+        self, node: Node, config: NavNodeConfig, diagnostics: Diagnostics, battery: Battery
+    ) -> None:
         self._node = node
         self._frames = config.map_frame, config.base_frame
         self._diagnostics = diagnostics
         self._sample: OdometrySample | None = None
         self._safety: tuple[bool, bool, tuple[float, float] | None] = (False, False, None)
         self._ring = UltrasonicRing(config.ultrasonic_frames)
+        self._battery = battery
         self._last = 0
         diagnostics.watch(POSE, config.mission.pose_timeout)
         self._listen(Odometry, POSE, self._on_pose)
         self._listen(DiagnosticStatus, 'safety_state', self._on_safety)
+        self._listen(BatteryState, BATTERY, self._on_battery)
         for frame in config.ultrasonic_frames:
             diagnostics.watch(f'{ULTRASONIC}/{frame}', config.reactive.stale_after)
             topic = f'{ULTRASONIC}/' + frame.removeprefix(f'{ULTRASONIC}_')
@@ -74,6 +80,14 @@ class Senses:
 
     def _on_safety(self, message: DiagnosticStatus) -> None:
         self._safety = safety_from_message(message)
+
+    def _on_battery(self, message: BatteryState) -> None:
+        now = now_ns(self._node)
+        refusal = self._battery.take(message.percentage, now, BATTERY)
+        if refusal is not None:
+            self._diagnostics.refuse(refusal)
+        else:
+            self._diagnostics.take(BATTERY, now)
 
     def _on_range(self, message: Range) -> None:
         sample = ultrasonic_from_message(message)

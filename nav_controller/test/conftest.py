@@ -41,6 +41,7 @@ tables:
   - {name: table_2, x: 4.6, y: 3.6, length: 0.4, width: 0.4, stop: [4.0, 3.0, 0.0]}
 """
 SENSORS = ('left', 'left_front', 'front', 'right_front', 'right')
+SERVICES = ('confirm', 'pause', 'resume', 'skip', 'cancel_delivery', 'return_home')
 PERIOD_S = 0.05
 START = Pose2(1.0, 1.0, 0.0)
 
@@ -119,16 +120,17 @@ class Customer:
     def __init__(self, probe: Probe) -> None:
         self.probe = probe
         self.client = ActionClient(probe.node, Deliver, 'deliver')
+        self.services = {name: probe.node.create_client(Trigger, name) for name in SERVICES}
         self.velocities = probe.listen(Twist, 'cmd_vel_nav')
         self.plans = probe.listen(PathMessage, 'plan')
         self.feedback: list[Deliver.Feedback] = []
         self.handle: Any = None
 
-    def send(self, *stops: Stop, return_home: bool = False) -> Any:
+    def send(self, *stops: Stop, return_home: bool = False, queue: bool = False) -> Any:
         """Send a goal; return its handle once it was answered."""
         self.probe.wait_for(self.client.server_is_ready, 'the deliver action')
         future = self.client.send_goal_async(
-            Deliver.Goal(stops=list(stops), return_home=return_home),
+            Deliver.Goal(stops=list(stops), return_home=return_home, queue=queue),
             lambda message: self.feedback.append(message.feedback),
         )
         self.probe.wait_for(future.done, 'an answer to the goal')
@@ -143,16 +145,21 @@ class Customer:
 
     def wait_state(self, words: str, limit_s: float = 20.0) -> Deliver.Feedback:
         """Wait for feedback of a state."""
-        self.probe.wait_for(
-            lambda: any(item.state == words for item in self.feedback),
-            f'feedback {words!r}, not only { {item.state for item in self.feedback} }',
-            limit_s,
-        )
+        try:
+            self.probe.wait_for(
+                lambda: any(item.state == words for item in self.feedback),
+                f'feedback {words!r}',
+                limit_s,
+            )
+        except AssertionError as error:
+            raise AssertionError(f'{error}; only { {i.state for i in self.feedback} }') from None
         return next(item for item in self.feedback if item.state == words)
 
     def ask(self, service: str) -> Trigger.Response:
-        """Return the answer of one of the node's services."""
-        return self.probe.call(Trigger, service, Trigger.Request())
+        """Return the answer of one of the node's services, which is asked once."""
+        future = self.services[service].call_async(Trigger.Request())
+        self.probe.wait_for(future.done, f'an answer of {service}')
+        return future.result()
 
     def cancel(self, handle: Any = None) -> int:
         """Ask for a goal's end; return how many goals are being cancelled."""

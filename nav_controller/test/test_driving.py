@@ -16,7 +16,7 @@ from tablerunner_interfaces.msg import Stop
 
 @pytest.fixture(scope='module')
 def shared(make_running: Callable[..., Any]) -> Any:
-    """One node for all tests here."""
+    """Return one node for all tests here."""
     return make_running()
 
 
@@ -28,8 +28,8 @@ def running(shared: Any) -> Any:
 
 
 def test_fuzzy_controller_drives_unless_another_is_asked_for(running: Any) -> None:
-    running.customer.send(Stop(table='table_1'), return_home=True)
-    assert running.customer.result()[1].reached == ['table_1', 'kitchen']
+    running.customer.send(Stop(table='table_1'))
+    assert running.customer.result()[1].reached == ['table_1']
     assert running.node.get_parameter('controller').value == 'fuzzy'
 
 
@@ -53,6 +53,7 @@ def test_reasons_are_published_on_request_only(running: Any) -> None:
     assert fired == sorted(fired, reverse=True)
     assert 0.0 < fired[0] <= 1.0
     assert probe.set_parameter('nav_controller', 'publish_trace', False) == ''
+    running.customer.cancel()
     running.customer.result()
 
 

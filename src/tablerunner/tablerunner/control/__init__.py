@@ -26,6 +26,7 @@ from tablerunner.control.room import (
     home_of,
     limits_within,
     make_planner,
+    make_surroundings,
     sensor_mounts,
     table_stop,
 )
@@ -36,6 +37,7 @@ from tablerunner.control.safety import (
     SafetyStop,
 )
 from tablerunner.control.safety_config import SafetyConfig
+from tablerunner.control.surroundings import Surroundings, SurroundingsConfig
 from tablerunner.control.tour import Tour
 
 __all__ = [
@@ -69,6 +71,8 @@ __all__ = [
     'SafetyState',
     'SafetyStop',
     'Situation',
+    'Surroundings',
+    'SurroundingsConfig',
     'Tour',
     'VelocityLimits',
     'configure_controller',
@@ -78,6 +82,7 @@ __all__ = [
     'limits_within',
     'make_controller',
     'make_planner',
+    'make_surroundings',
     'sensor_mounts',
     'stopping_distance',
     'table_stop',

@@ -9,6 +9,7 @@ from __future__ import annotations
 from tablerunner.control.alignment import AlignmentDrive
 from tablerunner.control.controller import Controller, Drive
 from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
+from tablerunner.control.fuzzy.readings import Readings
 from tablerunner.control.hand_over import HandOver
 from tablerunner.control.leg import Leg
 from tablerunner.control.look_around import LookAround
@@ -18,7 +19,9 @@ from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner
 from tablerunner.control.progress import ProgressWatch
+from tablerunner.control.surroundings import Surroundings
 from tablerunner.control.tour import Tour, check_stops
+from tablerunner.control.way_finder import WayFinder
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Velocity, nanoseconds, seconds
@@ -39,6 +42,8 @@ class Mission:
         Follows the planned paths.
     home : Destination or None
         Where a mission with ``return_home`` ends.
+    surroundings : Surroundings or None
+        What the sensors find that is not on the map is planned round, when they are told of.
     """
 
     def __init__(
@@ -47,11 +52,14 @@ class Mission:
         planner: Planner,
         controller: Controller,
         home: Destination | None = None,
+        surroundings: Surroundings | None = None,
     ) -> None:
         self.config = config
         self.planner = planner
         self.controller = controller
         self.home = home
+        self._ways = WayFinder(planner, surroundings)
+        self._readings: Readings | None = None
         self._state = MissionState.IDLE
         self._tour = Tour(())
         self._paused = False
@@ -74,7 +82,7 @@ class Mission:
     def configure(self, config: MissionConfig, planner: Planner) -> None:
         """Use other settings from now on; a mission under way goes on."""
         self.config = config
-        self.planner = planner
+        self.planner = self._ways.planner = planner
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
 
     def start(self, stops: tuple[Destination, ...], return_home: bool = False) -> None:
@@ -118,6 +126,11 @@ class Mission:
     def check(self, tour: Tour) -> None:
         """Look whether a tour can be taken on at all; see `take`."""
         check_stops(tour, self.planner)
+
+    def hear(self, readings: Readings) -> None:
+        """Take what the ultrasonic sensors hear now; counts for the next step only."""
+        self.controller.hear(readings)
+        self._readings = readings
 
     def cancel(self, reason: str = 'cancelled') -> None:
         """End the mission; the stops that were not reached are missed for this reason."""
@@ -196,6 +209,9 @@ class Mission:
         elapsed = seconds(situation.stamp - self._last_stamp) if self._last_stamp else 0.0
         elapsed = max(elapsed, 0.0)
         self._last_stamp = situation.stamp
+        readings, self._readings = self._readings, None
+        if readings is not None and situation.pose is not None and not self._lost.is_lost:
+            self._ways.hear(readings, situation.pose, situation.stamp)
         velocity: Velocity | None = None
         if self.is_busy and not self._paused:
             velocity = self._advance(situation, elapsed)
@@ -248,6 +264,7 @@ class Mission:
             return None
         if leg.path is None and not self._plan(situation, pose, stop):
             return None
+        self._look_ahead(situation, pose, stop)
         drive = self.controller.step(pose, dt)
         leg.distance_left = drive.distance_left
         if drive.arrived:
@@ -294,9 +311,7 @@ class Mission:
             return False
         discs = self._marks.discs(situation.stamp)
         try:
-            path = self.planner.plan(
-                pose, stop.pose, keep_heading=stop.keep_heading, blocked=discs
-            )
+            path = self._ways.way(pose, stop, discs)
         except PlanningError as error:
             if discs:
                 self._marks.clear()  # better wait before it than have no way at all
@@ -313,9 +328,26 @@ class Mission:
         self._events.append(f'{path.length:.1f} m to {stop.name}')
         return True
 
+    def _look_ahead(self, situation: Situation, pose: Pose2, stop: Destination) -> None:
+        """Take another way where something was found on this one."""
+        leg, discs = self._leg, self._marks.discs(situation.stamp)
+        if leg.path is None:
+            return
+        path = self._ways.other_way(
+            situation.stamp, pose, stop, leg.path, leg.distance_left, discs
+        )
+        if path is None:
+            return
+        self._events.append(f'something in the way: round it in {path.length:.1f} m')
+        leg.path, leg.distance_left = path, path.length
+        self.controller.follow(path)
+        if self._ways.has_moved(pose):
+            self._progress.restart()
+
     def _follow(self, path: Path) -> None:
         self._leg.path = path
         self._leg.distance_left = path.length
+        self._ways.begin()
         self.controller.follow(path)
         self._progress.restart()
         self._state = self._moving
@@ -356,12 +388,7 @@ class Mission:
         """Look for a way around what is in the way; keep waiting before it if there is none."""
         mark = disc_ahead(situation, pose, self.planner.footprint_radius)
         try:
-            path = self.planner.plan(
-                pose,
-                stop.pose,
-                keep_heading=stop.keep_heading,
-                blocked=(*self._marks.discs(situation.stamp), mark),
-            )
+            path = self._ways.way(pose, stop, (*self._marks.discs(situation.stamp), mark))
         except PlanningError as error:
             self._events.append(f'no way around ({error}): waiting')
             return

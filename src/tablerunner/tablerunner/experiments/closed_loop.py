@@ -31,6 +31,7 @@ from tablerunner.control import (
     limits_within,
     make_controller,
     make_planner,
+    make_surroundings,
     sensor_mounts,
 )
 from tablerunner.control.fuzzy.readings import UltrasonicRing
@@ -189,8 +190,13 @@ class ClosedLoop:
         self.controller: Controller = make_controller(
             chosen.controller, limits, robot, chosen.controllers
         )
+        planner = make_planner(room, chosen.planner)
         self.mission = Mission(
-            chosen.mission, make_planner(room, chosen.planner), self.controller, home_of(room)
+            chosen.mission,
+            planner,
+            self.controller,
+            home_of(room),
+            make_surroundings(room, planner),
         )
         self._ring = UltrasonicRing()
         self.safety = SafetyStop(
@@ -324,7 +330,7 @@ class ClosedLoop:
 
     def _control(self) -> MissionStatus:
         now, sample = self.now, self._sample
-        self.controller.hear(self._ring.readings(now))
+        self.mission.hear(self._ring.readings(now))
         blocked, held, obstacle = self._told
         local = self._local()
         situation = Situation(
