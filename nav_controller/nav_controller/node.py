@@ -34,6 +34,7 @@ from tablerunner.control import (
     limits_within,
     make_controller,
     make_planner,
+    make_surroundings,
 )
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.scenario import load_scenario
@@ -66,7 +67,15 @@ class NavNode(Node):
         )
         self._controller.explain(config.publish_trace)
         self._planner = make_planner(scenario, config.planner)
-        self._mission = Mission(config.mission, self._planner, self._controller, home_of(scenario))
+        self._mission = Mission(
+            config.mission,
+            self._planner,
+            self._controller,
+            home_of(scenario),
+            make_surroundings(
+                scenario, self._planner, config.surroundings, config.ultrasonic_frames
+            ),
+        )
         self._battery = Battery(config.battery)
         self._store = DeliveryStore(Path(config.queue_file)) if config.queue_file else None
         self._dispatcher = Dispatcher(
@@ -149,7 +158,7 @@ class NavNode(Node):
     def _on_timer(self) -> None:
         stamp = now_ns(self)
         situation = self._senses.situation(stamp)
-        self._controller.hear(self._senses.readings(stamp))
+        self._mission.hear(self._senses.readings(stamp))
         step = self._dispatcher.step(situation)
         self._status = step.status
         self._outputs.drive(step.velocity, stamp)

@@ -13,6 +13,7 @@ from tablerunner.control import (
     MissionConfig,
     PlannerConfig,
     SafetyConfig,
+    SurroundingsConfig,
     VelocityLimits,
 )
 from tablerunner.control.contour import ContourConfig
@@ -67,6 +68,9 @@ class NavNodeConfig(Config):
     )
     detour: DetourConfig = parameter(
         factory=DetourConfig, description='When it leaves the path for that'
+    )
+    surroundings: SurroundingsConfig = parameter(
+        factory=SurroundingsConfig, description='What is made of echoes that the map does not show'
     )
     planner: PlannerConfig = parameter(factory=PlannerConfig, description='What a good way is')
     mission: MissionConfig = parameter(
