@@ -19,6 +19,7 @@ import monte_carlo
 import offline
 import processor
 import protocols
+import safety
 import solvers
 from result import Result
 from rich.console import Console
@@ -30,6 +31,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'solvers': solvers.measure,
     'offline': offline.measure,
     'latency': latency.measure,
+    'safety': safety.measure,
     'processor': processor.measure,
     'memory': memory.measure,
     'fuzzy': fuzzy.measure,

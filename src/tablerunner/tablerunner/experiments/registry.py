@@ -16,12 +16,14 @@ from tablerunner.experiments.lv import run_lv
 from tablerunner.experiments.nlos import run_nlos
 from tablerunner.experiments.pf_uiekf import run_pf_uiekf
 from tablerunner.experiments.sun2019 import run_sun2019
+from tablerunner.experiments.sun2019_track import run_sun2019_track
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
     {
         'lv': run_lv,
         'bae2022': run_bae2022,
         'sun2019': run_sun2019,
+        'sun2019_track': run_sun2019_track,
         'pf_uiekf': run_pf_uiekf,
         'liu2023': run_liu2023,
         'nlos': run_nlos,
