@@ -69,9 +69,6 @@ class NavNodeConfig(Config):
     detour: DetourConfig = parameter(
         factory=DetourConfig, description='When it leaves the path for that'
     )
-    surroundings: SurroundingsConfig = parameter(
-        factory=SurroundingsConfig, description='What is made of echoes that the map does not show'
-    )
     planner: PlannerConfig = parameter(factory=PlannerConfig, description='What a good way is')
     surroundings: SurroundingsConfig = parameter(
         factory=SurroundingsConfig,
