@@ -16,6 +16,7 @@ import latency
 import memory
 import monte_carlo
 import offline
+import particles
 import processor
 import protocols
 import solvers
@@ -33,6 +34,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'memory': memory.measure,
     'fuzzy': fuzzy.measure,
     'protocols': protocols.measure,
+    'particles': particles.measure,
 }
 WITH_BAR = {'solvers', 'monte_carlo'}
 """Those that show a bar of their own, with which a spinner would fight for the line."""

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
+from tablerunner.experiments.global_start import run_global_start
 from tablerunner.experiments.lias import run_lias
 from tablerunner.experiments.liu2023 import run_liu2023
 from tablerunner.experiments.lv import run_lv
@@ -22,6 +23,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'bae2022': run_bae2022,
         'sun2019': run_sun2019,
         'pf_uiekf': run_pf_uiekf,
+        'global_start': run_global_start,
         'liu2023': run_liu2023,
         'nlos': run_nlos,
     }

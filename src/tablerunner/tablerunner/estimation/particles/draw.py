@@ -31,6 +31,7 @@ from tablerunner.estimation.particles.kld import enough, occupied
 from tablerunner.estimation.particles.progressive import FEWEST, progressed
 from tablerunner.estimation.particles.resampling import RESAMPLERS
 from tablerunner.estimation.particles.swarm import Swarm, Way, rotation
+from tablerunner.estimation.particles.triangular import times
 from tablerunner.estimation.particles.weights import effective_size, normalised
 from tablerunner.types import Matrix, Vector
 
@@ -155,7 +156,7 @@ def absorbed(
 
     if iteration is None:
         y, ratio = normal, np.zeros(len(poses))
-        states = poses + np.einsum('nij,nj->ni', view.roots, y)
+        states = poses + times(view.roots, y)
     else:
         updated = update(poses, view.roots, look, noise, iteration, view[:2])
         proposal = drawn(poses, view.roots, updated, normal)
