@@ -17,6 +17,7 @@ import latency
 import memory
 import monte_carlo
 import offline
+import particles
 import processor
 import protocols
 import safety
@@ -37,6 +38,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'fuzzy': fuzzy.measure,
     'protocols': protocols.measure,
     'drive_rooms': drive_rooms.measure,
+    'particles': particles.measure,
 }
 WITH_BAR = {'solvers', 'monte_carlo'}
 """Those that show a bar of their own, with which a spinner would fight for the line."""
