@@ -10,6 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import camera
 import filter_step
 import fuzzy
 import latency
@@ -33,6 +34,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'memory': memory.measure,
     'fuzzy': fuzzy.measure,
     'protocols': protocols.measure,
+    'camera': camera.measure,
 }
 WITH_BAR = {'solvers', 'monte_carlo'}
 """Those that show a bar of their own, with which a spinner would fight for the line."""
