@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -14,7 +13,7 @@ from result import Result
 from tablerunner.estimation import EstimatorConfig, Start
 from tablerunner.estimation.ekf import Ekf
 from tablerunner.estimation.models.motion_model import input_noise, move
-from tablerunner.estimation.models.range_model import predict_range
+from tablerunner.estimation.models.range_model import predict_ranges
 from tablerunner.estimation.models.state import (
     GYRO_BIAS,
     RANGE_BIAS,
@@ -23,10 +22,10 @@ from tablerunner.estimation.models.state import (
     TURN_SCALE,
 )
 from tablerunner.odometry import Motion
-from tablerunner.types import Anchor, Estimate, RangeSample
+from tablerunner.types import Anchor, RangeSample
 
 STEPS = 1000
-ROUNDS = 9
+ROUNDS, ROUND_STEPS = 60, 200  # short, so that some are undisturbed on a busy machine
 LEVER = (0.0, 0.0, 1.1)
 ANCHORS = tuple(
     Anchor(f'A{i}', place)
@@ -50,67 +49,81 @@ SAMPLES = tuple(
 )
 
 
-def ours(count: int) -> Estimate:
-    """Run our filter."""
-    ekf = Ekf(CONFIG, ANCHORS, LEVER)
-    estimate = ekf.start(START)
-    for k in range(STEPS):
-        estimate = ekf.predict(estimate, MOTION, k + 2)
-        if count == 1:
-            estimate, _ = ekf.update(estimate, SAMPLES[k % 4])
-        else:
-            estimate, _ = ekf.update_ranges(estimate, SAMPLES[:count])
-    return estimate
+class Ours:
+    """Our filter, `count` ranges in each step."""
+
+    def __init__(self, count: int) -> None:
+        self._ekf = Ekf(CONFIG, ANCHORS, LEVER)
+        self._samples = SAMPLES[:count]
+        self.estimate = self._ekf.start(START)
+
+    def run(self, steps: int) -> None:
+        """Do some steps."""
+        ekf, samples, estimate = self._ekf, self._samples, self.estimate
+        for k in range(steps):
+            estimate = ekf.predict(estimate, MOTION, k + 2)
+            if len(samples) == 1:
+                estimate, _ = ekf.update(estimate, samples[0])
+            else:
+                estimate, _ = ekf.update_ranges(estimate, samples)
+        self.estimate = estimate
 
 
-def filterpy(count: int, stacked: bool = False) -> ExtendedKalmanFilter:
-    """Run filterpy's filter on our models, as its documentation shows.
+class Filterpy:
+    """filterpy's filter on our models, as its documentation shows.
 
     Ranges of one instant are linearised at one place, as ours are, and taken one after the other,
     or `stacked` as one measurement of several numbers.
     """
-    first = Ekf(CONFIG, ANCHORS, LEVER).start(START)
-    ekf = ExtendedKalmanFilter(dim_x=len(first.mean), dim_z=count if stacked else 1)
-    ekf.x, ekf.P = first.mean.copy(), first.covariance.copy()
-    ekf.R = np.eye(count if stacked else 1) * VARIANCE
-    walk = np.zeros(len(first.mean))
-    walk[SCALE] = CONFIG.scale_walk**2 * MOTION.distance_m
-    walk[TURN_SCALE] = CONFIG.turn_scale_walk**2 * MOTION.turn_rad
-    walk[GYRO_BIAS] = CONFIG.gyro_bias_walk**2 * MOTION.dt_s
-    walk[RANGE_DELAY] = CONFIG.range_delay_walk**2 * MOTION.dt_s
-    walk[RANGE_BIAS : RANGE_BIAS + 4] = CONFIG.range_bias_walk**2 * MOTION.dt_s
-    variances = CONFIG.motion.variances(MOTION)
-    moved = ekf.x
 
-    def predict_x(_control: object = 0) -> None:
-        ekf.x = moved
+    def __init__(self, count: int, stacked: bool = False) -> None:
+        first = Ekf(CONFIG, ANCHORS, LEVER).start(START)
+        size = count if stacked else 1
+        self.ekf = ekf = ExtendedKalmanFilter(dim_x=len(first.mean), dim_z=size)
+        ekf.x, ekf.P = first.mean.copy(), first.covariance.copy()
+        ekf.R = np.eye(size) * VARIANCE
+        ekf.predict_x = self._predict_x
+        self._moved = ekf.x
+        self._stacked = stacked
+        self._anchors = [(anchor.position, i) for i, anchor in enumerate(ANCHORS[:count])]
+        self._measured = np.array([sample.range_m for sample in SAMPLES[:count]])
+        self._walk = walk = np.zeros(len(first.mean))
+        walk[SCALE] = CONFIG.scale_walk**2 * MOTION.distance_m
+        walk[TURN_SCALE] = CONFIG.turn_scale_walk**2 * MOTION.turn_rad
+        walk[GYRO_BIAS] = CONFIG.gyro_bias_walk**2 * MOTION.dt_s
+        walk[RANGE_DELAY] = CONFIG.range_delay_walk**2 * MOTION.dt_s
+        walk[RANGE_BIAS : RANGE_BIAS + 4] = CONFIG.range_bias_walk**2 * MOTION.dt_s
+        self._variances = CONFIG.motion.variances(MOTION)
 
-    ekf.predict_x = predict_x
-    for k in range(STEPS):
-        moved, ekf.F, by_input = move(ekf.x, MOTION)
-        ekf.Q = np.diag(walk)
-        input_noise(ekf.Q, by_input, *variances)
-        ekf.predict()
-        twist = (
-            (1.0 + ekf.x[SCALE]) * MOTION.distance_m / MOTION.dt_s,
-            (1.0 + ekf.x[TURN_SCALE]) * MOTION.turn_rad / MOTION.dt_s - ekf.x[GYRO_BIAS],
-        )
-        place = ekf.x
-        which = [k % 4] if count == 1 else range(count)
-        models = [predict_range(place, ANCHORS[i].position, LEVER, i, twist) for i in which]
-        expected = np.array([model[0] for model in models])
-        slopes = np.array([model[1] for model in models])
-        measured = np.array([SAMPLES[i].range_m for i in which])
-        if stacked:
-            ekf.update(measured, lambda x, h=slopes: h, lambda x, e=expected: e)
-            continue
-        for row in range(len(models)):
-            ekf.update(
-                measured[row : row + 1],
-                lambda x, h=slopes[row : row + 1]: h,
-                lambda x, h=slopes[row], e=expected[row], at=place: np.array([e + h.dot(x - at)]),
+    def _predict_x(self, _control: object = 0) -> None:
+        self.ekf.x = self._moved
+
+    def run(self, steps: int) -> None:
+        """Do some steps."""
+        ekf, measured = self.ekf, self._measured
+        for _ in range(steps):
+            self._moved, ekf.F, by_input = move(ekf.x, MOTION)
+            ekf.Q = np.diag(self._walk)
+            input_noise(ekf.Q, by_input, *self._variances)
+            ekf.predict()
+            twist = (
+                (1.0 + ekf.x[SCALE]) * MOTION.distance_m / MOTION.dt_s,
+                (1.0 + ekf.x[TURN_SCALE]) * MOTION.turn_rad / MOTION.dt_s - ekf.x[GYRO_BIAS],
             )
-    return ekf
+            place = ekf.x
+            ranges, slopes = predict_ranges(place, self._anchors, LEVER, twist)
+            expected = np.array(ranges)
+            if self._stacked:
+                ekf.update(measured, lambda x, h=slopes: h, lambda x, e=expected: e)
+                continue
+            for row in range(len(ranges)):
+                ekf.update(
+                    measured[row : row + 1],
+                    lambda x, h=slopes[row : row + 1]: h,
+                    lambda x, h=slopes[row], e=expected[row], at=place: np.array(
+                        [e + h.dot(x - at)]
+                    ),
+                )
 
 
 def compare(count: int) -> tuple[float, float, float]:
@@ -121,22 +134,24 @@ def compare(count: int) -> tuple[float, float, float]:
     RuntimeError
         They do not give the same numbers.
     """
-    mine, theirs = ours(count), filterpy(count)
+    mine, theirs, stacked = Ours(count), Filterpy(count), Filterpy(count, stacked=True)
+    mine.run(STEPS)
+    theirs.run(STEPS)
+    stacked.run(STEPS)
     apart = max(
-        float(np.abs(mine.mean - theirs.x).max()),
-        float(np.abs(mine.covariance - theirs.P).max()),
+        float(np.abs(mine.estimate.mean - theirs.ekf.x).max()),
+        float(np.abs(mine.estimate.covariance - theirs.ekf.P).max()),
     )
     if not apart < 1e-9:
         raise RuntimeError(f'ekf and filterpy differ by {apart:.3g} after {STEPS} steps')
-    runs: tuple[Callable[[int], object], ...] = (ours, filterpy, partial(filterpy, stacked=True))
-    times = [[_seconds(run, count) for run in runs] for _ in range(ROUNDS)]
-    one, two, three = np.min(times, axis=0) / STEPS * 1e6
+    times = [[_seconds(one.run) for one in (mine, theirs, stacked)] for _ in range(ROUNDS)]
+    one, two, three = np.min(times, axis=0) / ROUND_STEPS * 1e6
     return float(one), float(two), float(three)
 
 
-def _seconds(run: Callable[[int], object], count: int) -> float:
+def _seconds(run: Callable[[int], None]) -> float:
     begun = time.process_time()
-    run(count)
+    run(ROUND_STEPS)
     return time.process_time() - begun
 
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from filter_step import ANCHORS, CONFIG, LEVER, MOTION, SAMPLES, START, VARIANCE, ours
+from filter_step import ANCHORS, CONFIG, LEVER, MOTION, SAMPLES, START, VARIANCE, Ours
 from result import Result
 
 from tablerunner.cli.bar import Bar
@@ -18,7 +18,7 @@ from tablerunner.odometry.batch import Motions
 
 RUNS = 1000
 STEPS = 100
-SINGLE_STEPS = 1000  # of `filter_step.ours`
+SINGLE_STEPS = 1000  # of `filter_step.Ours`
 ROUNDS = 5
 SEEDS = 1000
 LONGEST_S = 60.0
@@ -45,7 +45,9 @@ def batched() -> BatchEstimate:
 
 def measure() -> Iterator[Result]:
     """Measure a step of one filter, alone and among many; then the whole experiment."""
-    times = [(_seconds(lambda: ours(1)), _seconds(batched)) for _ in range(ROUNDS)]
+    times = [
+        (_seconds(lambda: Ours(1).run(SINGLE_STEPS)), _seconds(batched)) for _ in range(ROUNDS)
+    ]
     alone, many = np.min(times, axis=0) * 1e6
     single, step = float(alone) / SINGLE_STEPS, float(many) / (STEPS * RUNS)
     yield Result(

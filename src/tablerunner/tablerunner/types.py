@@ -203,6 +203,17 @@ class UltrasonicSample:
 
 
 @dataclass(frozen=True, slots=True)
+class PersonSample:
+    """Where a person with a tag is and how the person walks, along the axes of base_link."""
+
+    stamp: int
+    tag_id: str
+    position: tuple[float, float]  # of the tag [m]
+    velocity: tuple[float, float]  # over the floor [m/s]
+    covariance: Matrix  # (4, 4): position and velocity; inf: a velocity that is not known
+
+
+@dataclass(frozen=True, slots=True)
 class Velocity:
     """Velocity of a differential drive: forward [m/s] and turn rate [rad/s]."""
 
@@ -210,8 +221,7 @@ class Velocity:
     angular_rad_s: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(NamedTuple):
     """What an estimator believes at one stamp.
 
     The first three states are always x, y [m] and heading [rad] of base_link in map; what follows
@@ -223,6 +233,7 @@ class Estimate:
     covariance: Matrix  # (n, n)
     twist: tuple[float, float] = (0.0, 0.0)  # forward [m/s] and turn rate [rad/s], last step
     memory: tuple[float, ...] = ()  # running statistics that the estimator keeps for itself
+    carried: object = None  # what else it keeps: the particles of a particle filter
 
     @property
     def pose(self) -> Pose2:

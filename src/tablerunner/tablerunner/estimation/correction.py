@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +37,7 @@ def correct(estimate: Estimate, expected: Expected, stamp: int) -> Estimate:
     mean[2] = wrap(float(mean[2]))
     keep = np.eye(len(mean)) - gain @ expected.slope
     covariance = keep @ estimate.covariance @ keep.T + gain @ expected.noise @ gain.T
-    return replace(estimate, stamp=stamp, mean=mean, covariance=0.5 * (covariance + covariance.T))
+    return estimate._replace(stamp=stamp, mean=mean, covariance=0.5 * (covariance + covariance.T))
 
 
 class CorrectedByOne(NamedTuple):

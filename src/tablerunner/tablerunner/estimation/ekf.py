@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -83,7 +82,9 @@ def bias_covariance(config: EstimatorConfig, count: int) -> Matrix:
 def range_variance(config: EstimatorConfig, sample: RangeSample) -> float:
     """Return the variance of a range [m^2], with what NLOS may add to it."""
     variance = sample.variance_m2 if sample.variance_m2 > 0.0 else config.default_range_std**2
-    variance = max(variance, config.least_range_std**2)
+    least = config.least_range_std**2
+    if variance < least:
+        variance = least
     probability = sample.nlos_probability
     if probability > 0.0:  # false for NaN
         variance += (probability * config.nlos_std) ** 2
@@ -111,6 +112,8 @@ class Ekf:
         self.lever_arm = lever_arm
         self.state_names = state_names(tuple(anchor.anchor_id for anchor in anchors))
         self._anchors = {anchor.anchor_id: (i, anchor) for i, anchor in enumerate(anchors)}
+        self._places = {anchor.anchor_id: (anchor.position, i) for i, anchor in enumerate(anchors)}
+        self._told_bias = {anchor.anchor_id: anchor.bias_m for anchor in anchors}
         self._size = RANGE_BIAS + 2 * len(anchors)
         self._biases = slice(RANGE_BIAS, RANGE_BIAS + len(anchors))
         self._scales = slice(RANGE_BIAS + len(anchors), self._size)
@@ -217,40 +220,36 @@ class Ekf:
     ) -> tuple[Estimate, tuple[Innovation, ...]] | None:
         """Return what `update_ranges` does if no range is out of the ordinary, else None."""
         config, memory = self.config, list(estimate.memory)
-        anchors = [self._anchors[sample.anchor_id] for sample in samples]
-        expected, slopes = predict_ranges(
-            estimate.mean,
-            [(anchor.position, index) for index, anchor in anchors],
-            self.lever_arm,
-            estimate.twist,
-        )
+        places = [self._places[sample.anchor_id] for sample in samples]
+        expected, slopes = predict_ranges(estimate.mean, places, self.lever_arm, estimate.twist)
         innovations = [
-            sample.range_m - anchor.bias_m - value
-            for sample, (_, anchor), value in zip(samples, anchors, expected, strict=True)
+            sample.range_m - self._told_bias[sample.anchor_id] - value
+            for sample, value in zip(samples, expected, strict=True)
         ]
-        noises = [range_variance(config, sample) for sample in samples]
-        cross = estimate.covariance.dot(slopes.T)
-        spread = slopes.dot(cross)
-        spread.reshape(-1)[:: len(samples) + 1] += noises
-        # LAPACK itself: NumPy's wrappers take longer than the arithmetic.
-        root, fault = dpotrf(spread, lower=1)
+        cross = slopes.dot(estimate.covariance)
+        spread = cross.dot(slopes.T)
+        for row, sample in enumerate(samples):
+            spread[row, row] += range_variance(config, sample)
+        # LAPACK itself, for NumPy's wrappers take longer than the arithmetic, and so do names of
+        # arguments: lower, clean, overwrite.
+        root, fault = dpotrf(spread.T, 1, 1, 1)
         if fault:
             return None
-        whiten, _ = dtrtri(root, lower=1)
+        whiten, _ = dtrtri(root, 1)
         white = whiten.dot(innovations)
-        deviations = white.tolist()
-        if max(deviations) > config.huber or min(deviations) < -config.huber:
-            return None
         scales = root.diagonal()
-        open_ = white * scales
-        variances = (scales * scales).reshape(-1, 1)
+        open_ = (white * scales).reshape(-1, 1)
+        variances = (scales * scales).reshape(-1, 1, 1)
+        # Out of the loop: reading an attribute takes as long as the comparison.
+        huber, gate, share = config.huber, config.gate, config.persistence_share
+        low, high = -config.doubt, config.persistence
         found = []
-        for row, (sample, deviation) in enumerate(zip(samples, deviations, strict=True)):
-            index = anchors[row][0]
+        for row, deviation in enumerate(white.tolist()):
+            sample, index = samples[row], places[row][1]
             persistent = memory[index]
-            if not -config.doubt < persistent < config.persistence:
+            if not (-huber <= deviation <= huber and low < persistent < high):
                 return None
-            memory[index] = persistent + config.persistence_share * (deviation - persistent)
+            memory[index] = persistent + share * (deviation - persistent)
             found.append(
                 Innovation(
                     sample.stamp,
@@ -258,18 +257,20 @@ class Ekf:
                     sample.anchor_id,
                     True,
                     '',
-                    open_[row : row + 1],
-                    variances[row : row + 1],
+                    open_[row],
+                    variances[row],
                     deviation * deviation,
-                    config.gate,
+                    gate,
                 )
             )
-        gained = cross.dot(whiten.T)
-        mean = estimate.mean + gained.dot(white)
+        gained = whiten.dot(cross)
+        mean = white.dot(gained)
+        mean += estimate.mean
         if not -math.pi < mean[HEADING] <= math.pi:
             mean[HEADING] = wrap(float(mean[HEADING]))
         # A product with its own transpose is symmetric to the last bit.
-        covariance = estimate.covariance - gained.dot(gained.T)
+        covariance = gained.T.dot(gained)
+        np.subtract(estimate.covariance, covariance, covariance)
         after = Estimate(samples[0].stamp, mean, covariance, estimate.twist, tuple(memory))
         return after, tuple(found)
 
@@ -312,7 +313,7 @@ class Ekf:
             after = Estimate(sample.stamp, mean, covariance, estimate.twist, tuple(memory))
         else:
             reason = 'beyond the gate'
-            after = replace(estimate, memory=tuple(memory))
+            after = estimate._replace(memory=tuple(memory))
         return after, Innovation(
             sample.stamp,
             RANGE_SOURCE,
@@ -337,7 +338,7 @@ class Ekf:
         covariance[row, row] = self._usual_bias**2
         memory = list(estimate.memory)
         memory[index] = 0.0
-        return replace(estimate, mean=mean, covariance=covariance, memory=tuple(memory))
+        return estimate._replace(mean=mean, covariance=covariance, memory=tuple(memory))
 
     def _expect(self, estimate: Estimate, anchor: Anchor, index: int) -> Expected:
         """Return what an anchor should read, linearised at the mean.

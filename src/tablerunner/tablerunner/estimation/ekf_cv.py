@@ -9,7 +9,6 @@ is never corrected. Ranges are corrections of one row each, in Joseph's form (32
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -130,12 +129,12 @@ class EkfCv(RangeByRange):
     def predict(self, estimate: Estimate, motion: Motion, stamp: int) -> Estimate:
         """Return the estimate carried to `stamp` (Sun 44, 45), its velocity measured (42)."""
         if motion.dt_s <= 0.0:
-            return replace(estimate, stamp=stamp)
+            return estimate._replace(stamp=stamp)
         _, turned = self.config.motion.variances(motion)
         mean, covariance = predict_moving(
             self.config.sun, estimate.mean, estimate.covariance, motion, turned
         )
-        return replace(estimate, stamp=stamp, mean=mean, covariance=covariance)
+        return estimate._replace(stamp=stamp, mean=mean, covariance=covariance)
 
     def update(self, estimate: Estimate, measurement: Measurement) -> tuple[Estimate, Innovation]:
         """Return the estimate corrected by a range or a position (Sun 46, 47, 32)."""
@@ -172,7 +171,7 @@ class EkfCv(RangeByRange):
             slope,
             self.config.sun.range_variance,
         )
-        after = replace(estimate, stamp=sample.stamp, mean=mean, covariance=covariance)
+        after = estimate._replace(stamp=sample.stamp, mean=mean, covariance=covariance)
         return after, Innovation(
             sample.stamp,
             RANGE_SOURCE,

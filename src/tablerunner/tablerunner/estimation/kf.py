@@ -10,7 +10,6 @@ odometry grows with the way, along it and across it, and a robot that stands gat
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -117,7 +116,7 @@ class Kf(RangeByRange):
             mean = estimate.mean.copy()
             mean[:2] += weighed.moved
             covariance = np.diag([*weighed.variance, estimate.covariance[2, 2]])
-            after = replace(estimate, stamp=measurement.stamp, mean=mean, covariance=covariance)
+            after = estimate._replace(stamp=measurement.stamp, mean=mean, covariance=covariance)
         return after, Innovation(
             measurement.stamp,
             measurement.source,

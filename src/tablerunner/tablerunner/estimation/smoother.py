@@ -15,8 +15,6 @@ For a linear model with Gaussian noise this is the exact posterior.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from tablerunner.estimation.estimator import Estimator
@@ -25,7 +23,7 @@ from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import Estimate, Matrix
 
-SMOOTHED = ('ekf', 'ukf', 'dead_reckoning')
+SMOOTHED = ('ekf', 'ukf', 'dead_reckoning', 'iekf', 'lm_iekf')
 """Estimators that can be smoothed: the others keep no covariance that F P F' + Q explains."""
 
 _HEADING = 2  # of every estimator: the only angle of a state
@@ -84,7 +82,7 @@ def smooth_step(
     # where rounding says so.
     left = without_negative(filtered.covariance - gain @ cross.T)
     covariance = left + gain @ later.covariance @ gain.T
-    return replace(filtered, mean=mean, covariance=0.5 * (covariance + covariance.T))
+    return filtered._replace(mean=mean, covariance=0.5 * (covariance + covariance.T))
 
 
 def slope_of(estimator: Estimator, estimate: Estimate, motion: Motion, stamp: int) -> Matrix:
@@ -128,12 +126,12 @@ def _undone(estimator: Estimator, later: Estimate, motion: Motion, stamp: int) -
     # The mean goes back by the motion turned round; the noise is that of the motion itself.
     back = Motion(-motion.distance_m, -motion.turn_rad, -motion.dt_s)
     mean = estimator.predict(later, back, stamp).mean
-    earlier = replace(later, stamp=stamp, mean=mean)
-    certain = replace(earlier, covariance=np.zeros_like(later.covariance))
+    earlier = later._replace(stamp=stamp, mean=mean)
+    certain = earlier._replace(covariance=np.zeros_like(later.covariance))
     noise = estimator.predict(certain, motion, later.stamp).covariance
     slope = slope_of(estimator, later, back, stamp)
     covariance = slope @ (later.covariance + noise) @ slope.T
-    return replace(earlier, covariance=0.5 * (covariance + covariance.T))
+    return earlier._replace(covariance=0.5 * (covariance + covariance.T))
 
 
 def inverse_of_covariance(covariance: Matrix) -> Matrix:
@@ -162,4 +160,4 @@ def without_negative(covariance: Matrix) -> Matrix:
 def _moved(estimate: Estimate, state: int, step: float) -> Estimate:
     mean = estimate.mean.copy()
     mean[state] += step
-    return replace(estimate, mean=mean)
+    return estimate._replace(mean=mean)

@@ -9,8 +9,14 @@ from tablerunner.scenario.box import Box
 from tablerunner.scenario.camera import Camera, Light
 from tablerunner.scenario.kitchen import Kitchen
 from tablerunner.scenario.outline import Outline
-from tablerunner.scenario.person import Person
-from tablerunner.scenario.robot import DriveLimits, Marker, RobotGeometry, UltrasonicMount
+from tablerunner.scenario.person import Person, PersonTag
+from tablerunner.scenario.robot import (
+    AnchorMount,
+    DriveLimits,
+    Marker,
+    RobotGeometry,
+    UltrasonicMount,
+)
 from tablerunner.scenario.scenario import Scenario, load_scenario
 from tablerunner.scenario.sensors import (
     ImuErrors,
@@ -24,6 +30,7 @@ from tablerunner.scenario.table import Table
 from tablerunner.scenario.wall import Wall
 
 __all__ = [
+    'AnchorMount',
     'AnchorPlace',
     'Box',
     'Camera',
@@ -35,6 +42,7 @@ __all__ = [
     'Marker',
     'Outline',
     'Person',
+    'PersonTag',
     'RobotGeometry',
     'Scenario',
     'SensorErrors',

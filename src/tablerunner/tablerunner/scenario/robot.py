@@ -30,6 +30,14 @@ class UltrasonicMount(Config):
         return Pose2(self.x, self.y, self.heading)
 
 
+@dataclass(frozen=True)
+class AnchorMount(Config):
+    """A UWB anchor on the robot, which ranges with tags that people carry."""
+
+    id: str = parameter(description='address that the anchor answers to')
+    position: tuple[float, float, float] = parameter(description='antenna in base_link', unit='m')
+
+
 def _five() -> tuple[UltrasonicMount, ...]:
     """Return the five sensors on the rim of the default footprint (Lv, fig. 4)."""
     places = (
@@ -129,6 +137,9 @@ class RobotGeometry(Config):
     )
     ultrasonics: tuple[UltrasonicMount, ...] = parameter(
         factory=_five, description='the ultrasonic sensors, in the order in which they fire'
+    )
+    anchors: tuple[AnchorMount, ...] = parameter(
+        (), description='UWB anchors on the robot, for the tags of people'
     )
     marker: Marker | None = parameter(
         None, description='what the camera under the ceiling knows the robot by'

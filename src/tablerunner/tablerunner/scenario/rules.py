@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tablerunner.scenario.scenario import Scenario
 
 _ROUTE_STEP_M = 0.05
+_ANCHOR_SPREAD_M = 0.05
 
 
 def check_scenario(scenario: Scenario) -> None:
@@ -29,6 +30,7 @@ def check_scenario(scenario: Scenario) -> None:
     _check_things(scenario)
     _check_stops(scenario)
     _check_people(scenario)
+    _check_tags(scenario)
     _check_routes(scenario)
     _check_camera(scenario)
 
@@ -140,6 +142,31 @@ def _check_people(scenario: Scenario) -> None:
             where = (leg + 1) % len(points)
             value = f'the way {list(here)} to {list(there)}'
             _check_clear(scenario, f'people[{index}].route[{where}]', way, person.radius, value)
+
+
+def _check_tags(scenario: Scenario) -> None:
+    """Refuse tags and anchors that answer to one name, and tags that no anchors can locate."""
+    taken = {scenario.tag_id: 'tag_id'}
+    taken.update({anchor.id: f'anchors[{i}].id' for i, anchor in enumerate(scenario.anchors)})
+    names = [(f'robot.anchors[{i}].id', item.id) for i, item in enumerate(scenario.robot.anchors)]
+    names += [
+        (f'people[{i}].tag.id', person.tag.id)
+        for i, person in enumerate(scenario.people)
+        if person.tag is not None
+    ]
+    for field, name in names:
+        if not name or name in taken:
+            other = f'another name than {taken[name]}' if name else 'a word'
+            raise ConfigError(field, name, other)
+        taken[name] = field
+    places = np.array([item.position[:2] for item in scenario.robot.anchors]).reshape(-1, 2)
+    worn = [i for i, person in enumerate(scenario.people) if person.tag is not None]
+    if worn and np.linalg.matrix_rank(places - places[:1], tol=_ANCHOR_SPREAD_M) < 2:
+        raise ConfigError(
+            'robot.anchors',
+            [list(item.position) for item in scenario.robot.anchors],
+            f'three anchors not in one line, to locate the tag of people[{worn[0]}]',
+        )
 
 
 def _check_routes(scenario: Scenario) -> None:

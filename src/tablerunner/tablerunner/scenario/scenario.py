@@ -97,6 +97,12 @@ class Scenario(Config):
             *(box.outline for box in self.boxes),
         )
 
+    @cached_property
+    def mapped(self) -> Scenario:
+        """The same room as the robot's map knows it: without boxes that are not on it."""
+        known = tuple(box for box in self.boxes if not box.unmapped)
+        return self if len(known) == len(self.boxes) else self.replace(boxes=known)
+
     def obstacle_segments(self) -> Array:
         """Return the edges of all that stands in the room, shape (n, 2, 2), in map [m]."""
         if not self.outlines:

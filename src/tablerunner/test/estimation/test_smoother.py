@@ -365,7 +365,7 @@ def test_extend_back_undoes_the_motion(room):
     start = smooth(run)[0]
     early = extend_back(run, start)
     again = early[0]
-    noise = replace(again, covariance=np.zeros_like(again.covariance))
+    noise = again._replace(covariance=np.zeros_like(again.covariance))
     for lead in run.lead_in:
         stamp = again.stamp + round(lead.onward.dt_s * 1e9)
         if lead.onward.dt_s > 0.0:

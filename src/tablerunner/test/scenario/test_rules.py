@@ -156,6 +156,45 @@ def test_rules_refuse_naming_file_line_and_field(tmp_path: Path, what: str) -> N
     assert words in str(error)
 
 
+TAGGED = GOOD.replace(
+    'route: [[5.0, 1.0], [5.0, 9.0]]',
+    'route: [[5.0, 1.0], [5.0, 9.0]], tag: {id: w1, position: [-0.25, 0.0, 1.0]}',
+).replace(
+    'robot:',
+    'robot:\n  anchors:\n    - {id: R0, position: [0.2, 0.2, 1.0]}\n'
+    '    - {id: R1, position: [-0.2, 0.2, 1.0]}\n    - {id: R2, position: [0.0, -0.2, 1.0]}',
+)
+
+
+def test_rules_accept_a_person_with_a_tag(tmp_path: Path) -> None:
+    load_text(tmp_path, TAGGED)
+
+
+@pytest.mark.parametrize(
+    ('good', 'bad', 'field', 'words'),
+    [
+        ('id: w1', 'id: tag', 'people[0].tag.id', 'another name than tag_id'),
+        ('id: w1', 'id: R1', 'people[0].tag.id', 'another name than robot.anchors[1].id'),
+        ('id: R1', 'id: A0', 'robot.anchors[1].id', 'another name than anchors[0].id'),
+        ('id: R1', 'id: R0', 'robot.anchors[1].id', 'another name than robot.anchors[0].id'),
+        ('id: R1', "id: ''", 'robot.anchors[1].id', 'a word'),
+        ('[0.0, -0.2, 1.0]', '[0.4, 0.2, 1.0]', 'robot.anchors', 'not in one line'),
+        ('    - {id: R2, position: [0.0, -0.2, 1.0]}\n', '', 'robot.anchors', 'three anchors'),
+        ('[-0.25, 0.0, 1.0]', '[-1.25, 0.0, 1.0]', 'people[0].tag.position', 'within 0.85 m'),
+        ('[-0.25, 0.0, 1.0]', '[-0.25, 0.0, 1.9]', 'people[0].tag.position', '1.7 m over'),
+        ('[-0.25, 0.0, 1.0]', '[-0.25, 0.0, .nan]', 'people[0].tag.position[2]', 'finite'),
+    ],
+)
+def test_rules_refuse_tags_that_cannot_be(
+    tmp_path: Path, good: str, bad: str, field: str, words: str
+) -> None:
+    assert TAGGED.count(good) == 1
+    with pytest.raises(ConfigError) as caught:
+        load_text(tmp_path, TAGGED.replace(good, bad))
+    assert caught.value.field == field
+    assert words in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ('text', 'words'),
     [

@@ -59,9 +59,8 @@ def predict_range(
         d(range)/d(state); units 1, 1, m/rad, 0 ... m/s, 0 ... 1, 0 ... m. Zero towards an anchor
         that the tag touches.
     """
-    jacobian, values = np.zeros(len(mean)), mean.tolist()
-    tag = _tag(values, lever_arm, twist)
-    return _range(values, tag, anchor, bias_index, jacobian), jacobian
+    expected, jacobian = predict_ranges(mean, ((anchor, bias_index),), lever_arm, twist)
+    return expected[0], jacobian[0]
 
 
 def predict_ranges(
@@ -84,12 +83,28 @@ def predict_ranges(
     expected : list of float
     jacobian : ndarray, shape (m, n)
     """
-    jacobian, values = np.zeros((len(anchors), len(mean))), mean.tolist()
-    tag = _tag(values, lever_arm, twist)
-    expected = [
-        _range(values, tag, anchor, index, row)
-        for (anchor, index), row in zip(anchors, jacobian, strict=True)
-    ]
+    size = len(mean)
+    jacobian, values, expected = np.zeros((len(anchors), size)), mean.tolist(), []
+    tag_x, tag_y, tag_z, from_base_x, from_base_y, by_delay_x, by_delay_y = _tag(
+        values, lever_arm, twist
+    )
+    first_scale = range_scale(size)
+    # Plain floats: reading an element of an array costs more than the arithmetic with it.
+    for number, ((anchor_x, anchor_y, anchor_z), index) in enumerate(anchors):
+        row = jacobian[number]
+        dx, dy, dz = tag_x - anchor_x, tag_y - anchor_y, tag_z - anchor_z
+        distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+        bias, scale = RANGE_BIAS + index, first_scale + index
+        grown = 1.0 + values[scale]
+        if distance > NEAREST_M:
+            ux, uy = grown * dx / distance, grown * dy / distance
+            row[X] = ux
+            row[Y] = uy
+            row[HEADING] = uy * from_base_x - ux * from_base_y
+            row[RANGE_DELAY] = ux * by_delay_x + uy * by_delay_y
+        row[bias] = 1.0
+        row[scale] = distance
+        expected.append(grown * distance + values[bias])
     return expected, jacobian
 
 
@@ -106,7 +121,6 @@ class _Tag(NamedTuple):
 
 
 def _tag(values: list[float], lever_arm: Point3, twist: Twist) -> _Tag:
-    # Plain floats: this runs for every range, and reading an array element costs ten times more.
     x, y, heading, delay = values[X], values[Y], values[HEADING], values[RANGE_DELAY]
     speed, turn_rate = twist
     cos, sin = math.cos(heading), math.sin(heading)
@@ -129,24 +143,6 @@ def _tag(values: list[float], lever_arm: Point3, twist: Twist) -> _Tag:
         sin * aside - cos * along,
         -sin * along - cos * aside,
     )
-
-
-def _range(values: list[float], tag: _Tag, anchor: Point3, index: int, jacobian: Vector) -> float:
-    """Return the expected range; fill the Jacobian, which is zero before."""
-    tag_x, tag_y, tag_z, from_base_x, from_base_y, by_delay_x, by_delay_y = tag
-    dx, dy, dz = tag_x - anchor[0], tag_y - anchor[1], tag_z - anchor[2]
-    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-    bias, scale = RANGE_BIAS + index, range_scale(len(values)) + index
-    grown = 1.0 + values[scale]
-    if distance > NEAREST_M:
-        ux, uy = grown * dx / distance, grown * dy / distance
-        jacobian[X] = ux
-        jacobian[Y] = uy
-        jacobian[HEADING] = uy * from_base_x - ux * from_base_y
-        jacobian[RANGE_DELAY] = ux * by_delay_x + uy * by_delay_y
-    jacobian[bias] = 1.0
-    jacobian[scale] = distance
-    return grown * distance + values[bias]
 
 
 def predict_range_many(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,8 +43,7 @@ def states(rng: np.random.Generator, name: str) -> list[Estimate]:
         memory = tuple(rng.uniform(-2.0, 2.0, len(first.memory)))
         twist = (rng.uniform(-0.5, 0.7), rng.uniform(-1.0, 1.0))
         found.append(
-            replace(
-                first,
+            first._replace(
                 mean=mean,
                 covariance=0.5 * (covariance + covariance.T),
                 memory=memory,
