@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
+from tablerunner.experiments.camera_limits import run_limits
 from tablerunner.experiments.camera_run import run_camera
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
 from tablerunner.experiments.global_start import run_global_start
@@ -30,6 +31,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'liu2023': run_liu2023,
         'nlos': run_nlos,
         'ceiling_camera': run_camera,
+        'camera_limits': run_limits,
     }
 )
 
