@@ -32,7 +32,7 @@ settings.load_profile('tablerunner')
 COMPUTING = 'gw0'
 """The worker for the core."""
 
-COMPUTING_NICENESS = 5
+COMPUTING_NICENESS = 3
 
 CORE = 'src/tablerunner/test/'
 FIRST = ('test/bringup/', 'test/bags/', 'nav_controller/test/', 'src/tablerunner_bringup/test/')
