@@ -18,7 +18,14 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-for package in ('fusion_node', 'nav_controller', 'odom_node', 'sim_bridge', 'uwb_driver'):
+for package in (
+    'ceiling_camera',
+    'fusion_node',
+    'nav_controller',
+    'odom_node',
+    'sim_bridge',
+    'uwb_driver',
+):
     # The core is tested where there are no nodes, too.
     with contextlib.suppress(ImportError):
         importlib.import_module(package)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from nav_msgs.msg import Path as PathMessage
@@ -16,6 +17,7 @@ from tablerunner.control import (
     SafetyDecision,
     SafetyState,
     Situation,
+    Tour,
     table_stop,
 )
 from tablerunner.errors import ConfigError, MissionError
@@ -47,7 +49,8 @@ def destinations_from_goal(
     for number, stop in enumerate(goal.stops, start=1):
         if stop.table:
             try:
-                stops.append(table_stop(scenario, stop.table, stop.wait))
+                place = table_stop(scenario, stop.table, stop.wait)
+                stops.append(replace(place, confirm_s=stop.confirm_within))
             except ConfigError as error:
                 raise MissionError(
                     f'stop {number}: no table {stop.table!r}; known are {error.expected}'
@@ -56,7 +59,7 @@ def destinations_from_goal(
         pose = goal_from_message(stop.pose, frame, 'deliver')
         if isinstance(pose, Refusal):
             raise MissionError(f'stop {number}: {pose.reason}')
-        stops.append(Destination(f'stop {number}', pose, stop.wait))
+        stops.append(Destination(f'stop {number}', pose, stop.wait, stop.confirm_within))
     return tuple(stops)
 
 
@@ -95,14 +98,22 @@ def feedback_from_status(
     return feedback
 
 
-def result_from_status(status: MissionStatus) -> Deliver.Result:
+def feedback_from_queue(place: int, situation: Situation, frame: str) -> Deliver.Feedback:
+    """Return the feedback of a delivery that waits for its turn."""
+    feedback = Deliver.Feedback(state='queued', queue_place=place, distance_left=math.nan)
+    feedback.pose = goal_to_message(situation.pose or Pose2(), situation.stamp, frame)
+    return feedback
+
+
+def result_from_tour(tour: Tour) -> Deliver.Result:
     """Return the result of a delivery that has ended."""
     return Deliver.Result(
-        success=not status.missed,
-        reached=list(status.reached),
-        missed=[name for name, _ in status.missed],
-        reasons=[reason for _, reason in status.missed],
-        message=status.message,
+        success=tour.is_success,
+        reached=list(tour.reached),
+        missed=[name for name, _ in tour.missed],
+        reasons=[reason for _, reason in tour.missed],
+        unconfirmed=list(tour.unconfirmed),
+        message=tour.message,
     )
 
 

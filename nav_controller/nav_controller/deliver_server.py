@@ -16,8 +16,8 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
-from nav_controller.convert import names_of_goal, result_from_status
-from tablerunner.control import MissionStatus
+from nav_controller.convert import names_of_goal, result_from_tour
+from tablerunner.control import Tour
 from tablerunner_interfaces.action import Deliver
 
 
@@ -39,17 +39,20 @@ class DeliverServer:
     ----------
     node : Node
     begin : callable
-        Takes a goal up; returns the reason why it cannot be, or ''.
+        Takes a goal up, given its id; returns the reason why it cannot be, or ''.
     cancel : callable
-        Ends what was begun; `finish` is expected to follow.
+        Ends what was begun under an id; `finish` is expected to follow.
     """
 
     def __init__(
-        self, node: Node, begin: Callable[[Deliver.Goal], str], cancel: Callable[[], None]
+        self,
+        node: Node,
+        begin: Callable[[Deliver.Goal, str], str],
+        cancel: Callable[[str], bool],
     ) -> None:
         self._begin = begin
         self._cancel = cancel
-        self._goal: ServerGoalHandle | None = None
+        self._goals: dict[str, ServerGoalHandle] = {}
         self._server = _DeferringServer(
             node,
             Deliver,
@@ -59,27 +62,23 @@ class DeliverServer:
             cancel_callback=self._on_cancel,
         )
 
-    @property
-    def is_active(self) -> bool:
-        """Whether a goal is under way."""
-        return self._goal is not None
+    def feedback(self, make: Callable[[str], Deliver.Feedback]) -> None:
+        """Publish feedback of each goal, made from its id."""
+        for name, goal in self._goals.items():
+            goal.publish_feedback(make(name))
 
-    def feedback(self, message: Deliver.Feedback) -> None:
-        """Publish feedback of the goal under way."""
-        if self._goal is not None:
-            self._goal.publish_feedback(message)
-
-    def finish(self, status: MissionStatus) -> None:
-        """End the goal under way with the outcome of its mission."""
-        goal, self._goal = self._goal, None
+    def finish(self, name: str, tour: Tour) -> None:
+        """End a goal with what became of its stops; one without a client is passed over."""
+        goal = self._goals.pop(name, None)
         if goal is not None:
-            self._end(goal, result_from_status(status))
+            self._end(goal, result_from_tour(tour))
 
     def _on_accepted(self, goal: ServerGoalHandle) -> None:
-        reason = self._begin(goal.request)
+        name = _name_of(goal)
+        reason = self._begin(goal.request, name)
         goal.execute()
         if not reason:
-            self._goal = goal
+            self._goals[name] = goal
             return
         names = names_of_goal(goal.request)
         refused = Deliver.Result(
@@ -88,9 +87,9 @@ class DeliverServer:
         self._end(goal, refused)
 
     def _on_cancel(self, goal: ServerGoalHandle) -> CancelResponse:
-        if self._goal is None or goal.goal_id != self._goal.goal_id:
+        name = _name_of(goal)
+        if name not in self._goals or not self._cancel(name):
             return CancelResponse.REJECT
-        self._cancel()
         return CancelResponse.ACCEPT
 
     def _end(self, goal: ServerGoalHandle, result: Deliver.Result) -> None:
@@ -104,3 +103,7 @@ class DeliverServer:
             return result
 
         self._server.notify_execute(goal, end)
+
+
+def _name_of(goal: ServerGoalHandle) -> str:
+    return bytes(goal.goal_id.uuid).hex()

@@ -2,93 +2,101 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
-from nav_msgs.msg import Odometry
+from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 
 from nav_controller.convert import (
     destinations_from_goal,
+    feedback_from_queue,
     feedback_from_status,
-    plan_to_message,
-    safety_from_message,
-    situation_of,
 )
 from nav_controller.deliver_server import DeliverServer
+from nav_controller.outputs import Outputs
 from nav_controller.params import NavNodeConfig
+from nav_controller.requests import Requests
+from nav_controller.senses import Senses
 from tablerunner.control import (
+    Battery,
+    Delivery,
+    DeliveryStore,
     Destination,
+    Dispatcher,
     Mission,
     MissionState,
     MissionStatus,
-    PurePursuit,
+    Situation,
+    configure_controller,
     home_of,
     limits_within,
+    make_controller,
     make_planner,
 )
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.scenario import load_scenario
-from tablerunner.types import OdometrySample, Refusal, Velocity, nanoseconds
+from tablerunner.types import Refusal, nanoseconds
 from tablerunner_interfaces.action import Deliver
 from tablerunner_ros.clocks import now_ns
-from tablerunner_ros.conversions.odometry import odometry_from_message
 from tablerunner_ros.conversions.pose import goal_from_message, path_from_message
-from tablerunner_ros.conversions.velocity import velocity_to_twist, velocity_to_twist_stamped
 from tablerunner_ros.diagnostics import ERROR, WARN, Diagnostics, Report
 from tablerunner_ros.parameters import declare_config
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.spin import spin_node
 
-POSE, GOAL, WAYPOINTS, DELIVER = 'odometry/filtered', 'goal_pose', 'waypoints', 'deliver'
+GOAL, WAYPOINTS, DELIVER = 'goal_pose', 'waypoints', 'deliver'
 
 
 class NavNode(Node):
-    """Runs one mission at a time in its control timer."""
+    """Asks the dispatcher in its control timer what to drive."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__('nav_controller', **options)
         self._config = config = declare_config(self, NavNodeConfig, on_change=self._configure)
         self._scenario = scenario = load_scenario(config.scenario)
         limits = limits_within(config.limits, scenario.robot.limits)
-        self._controller = PurePursuit(config.follower, limits)
+        self._controller = make_controller(
+            config.controller,
+            limits,
+            scenario.robot,
+            config.controllers,
+            config.ultrasonic_frames,
+        )
+        self._controller.explain(config.publish_trace)
         self._planner = make_planner(scenario, config.planner)
         self._mission = Mission(config.mission, self._planner, self._controller, home_of(scenario))
-        self._sample: OdometrySample | None = None
-        self._safety = (False, False, None)  # blocked, held, obstacle
+        self._battery = Battery(config.battery)
+        self._store = DeliveryStore(Path(config.queue_file)) if config.queue_file else None
+        self._dispatcher = Dispatcher(
+            self._mission,
+            self._battery,
+            config.queue_limit,
+            None if self._store is None else self._store.load(),
+            None if self._store is None else self._store.save,
+        )
         self._status: MissionStatus = self._mission.status
-        self._plan_shown: object = None
+        self._last = ''
         self._feedback_due = 0
-        kind = TwistStamped if config.twist_stamped else Twist
-        self._velocity = self.create_publisher(kind, 'cmd_vel_nav', qos_for('cmd_vel_nav'))
-        self._plan = self.create_publisher(PathMessage, 'plan', qos_for('plan'))
+        self._outputs = Outputs(self, config)
         self._diagnostics = Diagnostics(self)
-        self._diagnostics.watch(POSE, config.mission.pose_timeout)
+        self._senses = Senses(self, config, self._diagnostics, self._battery)
         self._diagnostics.describe(self._describe)
-        self._deliver = DeliverServer(self, self._begin, self._mission.cancel)
+        self._deliver = DeliverServer(self, self._begin, self._dispatcher.cancel)
+        self._requests = Requests(self, self._dispatcher)
         for type_, topic, callback in (
-            (Odometry, POSE, self._on_pose),
-            (DiagnosticStatus, 'safety_state', self._on_safety),
             (PoseStamped, GOAL, self._on_goal),
             (PathMessage, WAYPOINTS, self._on_waypoints),
         ):
             self.create_subscription(type_, topic, callback, qos_for(topic, subscriber=True))
         self.create_timer(1.0 / config.control_rate, self._on_timer)
 
-    def _on_pose(self, message: Odometry) -> None:
-        sample = odometry_from_message(
-            message, self._config.map_frame, self._config.base_frame, POSE
-        )
-        if isinstance(sample, Refusal):
-            self._diagnostics.refuse(sample)
-            return
-        self._diagnostics.take(POSE, sample.stamp)
-        self._sample = sample
-
-    def _on_safety(self, message: DiagnosticStatus) -> None:
-        self._safety = safety_from_message(message)
+    def destroy_node(self) -> None:
+        """Let others use the queue's file."""
+        if self._store is not None:
+            self._store.close()
+        super().destroy_node()
 
     def _on_goal(self, message: PoseStamped) -> None:
         pose = goal_from_message(message, self._config.map_frame, GOAL)
@@ -110,30 +118,28 @@ class NavNode(Node):
         self._go(WAYPOINTS, stops)
 
     def _go(self, source: str, stops: tuple[Destination, ...]) -> None:
-        """Start a mission for a topic; it replaces one that came by topic, never a delivery."""
-        if not self._deliver.is_active:
-            self._mission.cancel('replaced by another goal')
-        reason = self._start(source, stops, return_home=False)
-        if not reason:
-            self.get_logger().info(f'{source}: {len(stops)} to reach')
+        """Drive to places for a topic; that replaces what came by topic, never a delivery."""
+        try:
+            self._dispatcher.go(stops, now_ns(self))
+        except (MissionError, PlanningError) as error:
+            self._refuse(source, str(error))
+            return
+        self._diagnostics.take(source, now_ns(self))
+        self.get_logger().info(f'{source}: {len(stops)} to reach')
 
-    def _begin(self, goal: Deliver.Goal) -> str:
-        """Take up a delivery; return why it cannot be, or ''."""
+    def _begin(self, goal: Deliver.Goal, name: str) -> str:
+        """Take a delivery; return why it cannot be taken, or ''."""
+        stamp = now_ns(self)
         try:
             stops = destinations_from_goal(goal, self._scenario, self._config.map_frame)
-        except MissionError as error:
-            return self._refuse(DELIVER, str(error))
-        reason = self._start(DELIVER, stops, goal.return_home)
-        if not reason:
-            self.get_logger().info('deliver: ' + ', '.join(stop.name for stop in stops))
-        return reason
-
-    def _start(self, source: str, stops: tuple[Destination, ...], return_home: bool) -> str:
-        try:
-            self._mission.start(stops, return_home)
+            if not stops:
+                raise MissionError('a delivery needs at least one stop')
+            delivery = Delivery(name, self._mission.tour_of(stops, goal.return_home))
+            self._dispatcher.submit(delivery, stamp, goal.queue)
         except (MissionError, PlanningError) as error:
-            return self._refuse(source, str(error))
-        self._diagnostics.take(source, now_ns(self))
+            return self._refuse(DELIVER, str(error))
+        self._diagnostics.take(DELIVER, stamp)
+        self.get_logger().info('deliver: ' + ', '.join(stop.name for stop in stops))
         return ''
 
     def _refuse(self, source: str, reason: str) -> str:
@@ -142,45 +148,54 @@ class NavNode(Node):
 
     def _on_timer(self) -> None:
         stamp = now_ns(self)
-        situation = situation_of(stamp, self._sample, *self._safety)
-        velocity, status = self._mission.step(situation)
-        self._status = status
-        self._send(velocity, stamp)
-        for event in status.events:
+        situation = self._senses.situation(stamp)
+        self._controller.hear(self._senses.readings(stamp))
+        step = self._dispatcher.step(situation)
+        self._status = step.status
+        self._outputs.drive(step.velocity, stamp)
+        self._outputs.plan(step.status.path, stamp)
+        self._outputs.explain(self._controller.traces, stamp)
+        for event in step.events:
             self.get_logger().info(event)
-        if status.path is not self._plan_shown:
-            self._plan_shown = status.path
-            self._plan.publish(plan_to_message(status.path, stamp, self._config.map_frame))
-        if status.state.is_final:
-            self._deliver.finish(status)
-        elif stamp >= self._feedback_due or stamp < self._feedback_due - nanoseconds(10.0):
+        for ended in step.ended:
+            self._last = f'{ended.state.value}: {ended.tour.message}'
+            self._deliver.finish(ended.id, ended.tour)
+        if stamp >= self._feedback_due or stamp < self._feedback_due - nanoseconds(10.0):
             self._feedback_due = stamp + nanoseconds(1.0 / self._config.feedback_rate)
-            self._deliver.feedback(feedback_from_status(status, situation, self._config.map_frame))
+            self._deliver.feedback(lambda name: self._feedback(name, situation))
 
-    def _send(self, velocity: Velocity, stamp: int) -> None:
-        if self._config.twist_stamped:
-            message = velocity_to_twist_stamped(velocity, stamp, self._config.base_frame)
-        else:
-            message = velocity_to_twist(velocity)
-        self._velocity.publish(message)
+    def _feedback(self, name: str, situation: Situation) -> Deliver.Feedback:
+        if name == self._dispatcher.current:
+            return feedback_from_status(self._status, situation, self._config.map_frame)
+        place = self._dispatcher.queue.place(name) or 0
+        return feedback_from_queue(place, situation, self._config.map_frame)
 
     def _configure(self, config: NavNodeConfig) -> None:
         self._config = config
         limits = limits_within(config.limits, self._scenario.robot.limits)
-        self._controller.configure(config.follower, limits)
+        configure_controller(self._controller, limits, config.controllers)
+        self._controller.explain(config.publish_trace)
         self._planner = self._planner.configured(config.planner)
         self._mission.configure(config.mission, self._planner)
+        self._battery.config = config.battery
 
     def _describe(self, report: Report) -> None:
-        status = self._status
+        status, dispatcher, stamp = self._status, self._dispatcher, now_ns(self)
         report.values['state'] = status.state.value
         report.values['stop'] = status.stop
         report.values['distance left [m]'] = f'{status.distance_left:.2f}'
         report.values['scenario'] = self._scenario.name
+        report.values['deliveries'] = str(len(dispatcher.queue))
+        report.values['last delivery'] = self._last
+        report.values['battery charge'] = self._battery.words(stamp)
+        if dispatcher.fault:
+            report.add(ERROR, dispatcher.fault)
         if status.state is MissionState.FAILED:
             report.add(ERROR, status.message)
         elif status.state in (MissionState.BLOCKED, MissionState.LOCALISING, MissionState.HELD):
             report.add(WARN, status.state.value)
+        if self._battery.is_low(stamp):
+            report.add(WARN, f'battery low: {self._battery.words(stamp)}')
 
 
 def main() -> int:

@@ -7,22 +7,20 @@ from dataclasses import dataclass
 from tablerunner.config import Config, parameter
 from tablerunner.control import (
     CONTROLLERS,
+    BatteryConfig,
+    ControllerSettings,
     FollowerConfig,
     MissionConfig,
     PlannerConfig,
     SafetyConfig,
     VelocityLimits,
 )
+from tablerunner.control.contour import ContourConfig
+from tablerunner.control.fuzzy import ReactiveConfig, TrackConfig
+from tablerunner.control.fuzzy.readings import FRAMES
+from tablerunner.control.fuzzy_controller import DetourConfig
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
-
-_FRAMES = (
-    'ultrasonic_left',
-    'ultrasonic_left_front',
-    'ultrasonic_front',
-    'ultrasonic_right_front',
-    'ultrasonic_right',
-)
 
 
 @dataclass(frozen=True)
@@ -42,18 +40,66 @@ class NavNodeConfig(Config):
         False, description='Whether cmd_vel_nav is TwistStamped instead of Twist'
     )
     controller: str = parameter(
-        'pure_pursuit', description='What follows the planned paths', choices=CONTROLLERS
+        CONTROLLERS[0], description='What follows the planned paths', choices=CONTROLLERS
+    )
+    ultrasonic_frames: tuple[str, ...] = parameter(
+        FRAMES, description='Frames of the five ultrasonic sensors, from left to right'
+    )
+    publish_trace: bool = parameter(
+        False,
+        description='Whether fuzzy_trace tells which rules fire, how strongly, what comes out',
+        dynamic=True,
     )
     limits: VelocityLimits = parameter(
         factory=VelocityLimits, description='Velocity limits, within those of the base'
     )
     follower: FollowerConfig = parameter(
-        factory=FollowerConfig, description='How paths are followed'
+        factory=FollowerConfig, description='How paths end, and how pure_pursuit follows them'
+    )
+    track: TrackConfig = parameter(
+        factory=TrackConfig, description='How the fuzzy controller keeps to a path'
+    )
+    reactive: ReactiveConfig = parameter(
+        factory=ReactiveConfig, description='How it drives by what it hears'
+    )
+    contour: ContourConfig = parameter(
+        factory=ContourConfig, description='How it goes along what is in its way'
+    )
+    detour: DetourConfig = parameter(
+        factory=DetourConfig, description='When it leaves the path for that'
     )
     planner: PlannerConfig = parameter(factory=PlannerConfig, description='What a good way is')
     mission: MissionConfig = parameter(
         factory=MissionConfig, description='How patient a mission is'
     )
+    battery: BatteryConfig = parameter(
+        factory=BatteryConfig, description='When the battery counts as low'
+    )
+    queue_file: str = parameter(
+        '', description='File that keeps the deliveries over a restart; empty: none does'
+    )
+    queue_limit: int = parameter(
+        20, description='Most deliveries that are under way or wait', low=1, high=1000
+    )
+
+    def check(self) -> None:
+        """Want five sensors, and a least speed that the limits allow."""
+        frames = self.ultrasonic_frames
+        if len(frames) != len(FRAMES) or len(set(frames)) != len(frames):
+            raise ConfigError(
+                'ultrasonic_frames', list(frames), f'{len(FRAMES)} frames, each once'
+            )
+        if self.reactive.min_speed > self.limits.max_speed:
+            raise ConfigError(
+                'reactive.min_speed', self.reactive.min_speed, 'at most limits.max_speed'
+            )
+
+    @property
+    def controllers(self) -> ControllerSettings:
+        """What the path controllers are set to."""
+        return ControllerSettings(
+            self.follower, self.track, self.reactive, self.contour, self.detour
+        )
 
 
 @dataclass(frozen=True)
@@ -65,7 +111,7 @@ class SafetyNodeConfig(Config):
         description='Scenario file to take sensors, footprint and base limits from; may be empty',
     )
     ultrasonic_frames: tuple[str, ...] = parameter(
-        _FRAMES, description='Frames of the ultrasonic sensors; all must be heard'
+        FRAMES, description='Frames of the ultrasonic sensors; all must be heard'
     )
     ultrasonic_poses: tuple[float, ...] = parameter(
         (

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from nav_msgs.msg import Path as PathMessage
+from rclpy.action import ActionClient
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import Range
+from std_srvs.srv import Trigger
 
+from nav_controller.node import NavNode
 from tablerunner.geometry.pose import Pose2
+from tablerunner_interfaces.action import Deliver
+from tablerunner_interfaces.msg import Stop
 from tablerunner_ros.conversions.quaternion import fill_quaternion
+from tablerunner_ros.testing.domain import lease_domain
 from tablerunner_ros.testing.fixtures import domain, probe, processes, quick_diagnostics
 from tablerunner_ros.testing.probe import Probe
 
@@ -31,7 +41,9 @@ tables:
   - {name: table_2, x: 4.6, y: 3.6, length: 0.4, width: 0.4, stop: [4.0, 3.0, 0.0]}
 """
 SENSORS = ('left', 'left_front', 'front', 'right_front', 'right')
+SERVICES = ('confirm', 'pause', 'resume', 'skip', 'cancel_delivery', 'return_home')
 PERIOD_S = 0.05
+START = Pose2(1.0, 1.0, 0.0)
 
 
 class Robot:
@@ -47,7 +59,7 @@ class Robot:
 
     def __init__(self, probe: Probe, follow: str = '') -> None:
         self.probe = probe
-        self.pose = Pose2(1.0, 1.0, 0.0)
+        self.pose = START
         self.ranges = dict.fromkeys(SENSORS, math.inf)
         self.position_variance, self.heading_variance = 0.0025, 0.0025
         self.localised = True
@@ -99,6 +111,135 @@ class Robot:
         message.header.stamp = self.probe.node.get_clock().now().to_msg()
         message.header.frame_id = f'ultrasonic_{name}'
         self.probe.publish(f'ultrasonic/{name}', message)
+
+
+class Customer:
+    """Sends deliveries and listens to how they go."""
+
+    def __init__(self, probe: Probe) -> None:
+        self.probe = probe
+        self.client = ActionClient(probe.node, Deliver, 'deliver')
+        self.services = {name: probe.node.create_client(Trigger, name) for name in SERVICES}
+        self.velocities = probe.listen(Twist, 'cmd_vel_nav')
+        self.plans = probe.listen(PathMessage, 'plan')
+        self.feedback: list[Deliver.Feedback] = []
+        self.handle: Any = None
+
+    def send(self, *stops: Stop, return_home: bool = False, queue: bool = False) -> Any:
+        """Send a goal; return its handle once it was answered."""
+        self.probe.wait_for(self.client.server_is_ready, 'the deliver action')
+        future = self.client.send_goal_async(
+            Deliver.Goal(stops=list(stops), return_home=return_home, queue=queue),
+            lambda message: self.feedback.append(message.feedback),
+        )
+        self.probe.wait_for(future.done, 'an answer to the goal')
+        self.handle = future.result()
+        return self.handle
+
+    def result(self, handle: Any = None, limit_s: float = 60.0) -> tuple[int, Deliver.Result]:
+        """Wait for the end; return status and result."""
+        future = (handle or self.handle).get_result_async()
+        self.probe.wait_for(future.done, 'a result', limit_s)
+        return future.result().status, future.result().result
+
+    def wait_state(self, words: str, limit_s: float = 20.0) -> Deliver.Feedback:
+        """Wait for feedback of a state."""
+        try:
+            self.probe.wait_for(
+                lambda: any(item.state == words for item in self.feedback),
+                f'feedback {words!r}',
+                limit_s,
+            )
+        except AssertionError as error:
+            raise AssertionError(f'{error}; only { {i.state for i in self.feedback} }') from None
+        return next(item for item in self.feedback if item.state == words)
+
+    def ask(self, service: str) -> Trigger.Response:
+        """Return the answer of one of the node's services, which is asked once."""
+        future = self.services[service].call_async(Trigger.Request())
+        self.probe.wait_for(future.done, f'an answer of {service}')
+        return future.result()
+
+    def cancel(self, handle: Any = None) -> int:
+        """Ask for a goal's end; return how many goals are being cancelled."""
+        future = (handle or self.handle).cancel_goal_async()
+        self.probe.wait_for(future.done, 'an answer to the cancellation')
+        return len(future.result().goals_canceling)
+
+    def stands(self, duration_s: float = 0.5) -> bool:
+        """Return whether zero, and nothing else, is commanded for a while."""
+        seen = len(self.velocities)
+        self.probe.spin(duration_s)
+        new = self.velocities[seen:]
+        return bool(new) and all(m.linear.x == 0.0 and m.angular.z == 0.0 for m in new)
+
+
+class Running:
+    """One node for the tests of a module, each of which finds the robot at its start.
+
+    Attributes
+    ----------
+    probe : Probe
+    robot : Robot
+    customer : Customer
+    """
+
+    def __init__(self, domain: int, room: Path, parameters: dict[str, Any]) -> None:
+        self.probe = Probe(domain)
+        self.robot = Robot(self.probe, 'cmd_vel_nav')
+        values = {'scenario': str(room), **parameters}
+        self.node = self.probe.host(
+            NavNode,
+            parameter_overrides=[Parameter(name, value=each) for name, each in values.items()],
+        )
+        self.customer = Customer(self.probe)
+        self.probe.get_parameter('nav_controller', 'scenario')
+
+    def begin(self) -> None:
+        """Forget what was heard, and put the robot at its start."""
+        self.robot.pose = START
+        self.robot.ranges = dict.fromkeys(SENSORS, math.inf)
+        self.robot.localised = True
+        self.customer.feedback.clear()
+
+
+@pytest.fixture(scope='module')
+def make_running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Running]]:
+    """Return a maker of nodes that a module shares; parameters by keyword."""
+    made: list[Running] = []
+    with contextlib.ExitStack() as stack:
+        patch = stack.enter_context(pytest.MonkeyPatch.context())
+        patch.setattr('tablerunner_ros.diagnostics.PERIOD_S', 0.1)
+
+        def make(**parameters: Any) -> Running:
+            path = tmp_path_factory.mktemp('room') / 'room.yaml'
+            path.write_text(ROOM, encoding='utf-8')
+            item = Running(stack.enter_context(lease_domain()), path, parameters)
+            made.append(item)
+            return item
+
+        yield make
+        for item in made:
+            item.probe.close()
+
+
+@pytest.fixture
+def robot(make_robot: Callable[..., Robot]) -> Robot:
+    """Return a robot that drives as nav_controller wants."""
+    return make_robot('cmd_vel_nav')
+
+
+@pytest.fixture
+def customer(probe: Probe, room: Path) -> Customer:
+    """Return a customer of a node of the test's own."""
+    probe.host(NavNode, parameter_overrides=[Parameter('scenario', value=str(room))])
+    return Customer(probe)
+
+
+@pytest.fixture
+def make_customer() -> type[Customer]:
+    """Return a maker of customers."""
+    return Customer
 
 
 @pytest.fixture(autouse=True)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path as PathMessage
-from rclpy.action import ActionClient
 from rclpy.parameter import Parameter
 
 from nav_controller.node import NavNode
-from tablerunner_interfaces.action import Deliver
 from tablerunner_interfaces.msg import Stop
 from tablerunner_ros.testing.probe import Probe
 from tablerunner_ros.testing.process import Processes
@@ -34,63 +31,7 @@ def table(name: str, wait: float = 0.0) -> Stop:
     return Stop(table=name, wait=wait)
 
 
-class Customer:
-    """Sends deliveries and listens to how they go."""
-
-    def __init__(self, probe: Probe) -> None:
-        self.probe = probe
-        self.client = ActionClient(probe.node, Deliver, 'deliver')
-        self.velocities = probe.listen(Twist, 'cmd_vel_nav')
-        self.plans = probe.listen(PathMessage, 'plan')
-        self.feedback: list[Deliver.Feedback] = []
-        self.handle: Any = None
-
-    def send(self, *stops: Stop, return_home: bool = False) -> Any:
-        """Send a goal; return its handle once it was answered."""
-        self.probe.wait_for(self.client.server_is_ready, 'the deliver action')
-        future = self.client.send_goal_async(
-            Deliver.Goal(stops=list(stops), return_home=return_home),
-            lambda message: self.feedback.append(message.feedback),
-        )
-        self.probe.wait_for(future.done, 'an answer to the goal')
-        self.handle = future.result()
-        return self.handle
-
-    def result(self, handle: Any = None, limit_s: float = 60.0) -> tuple[int, Deliver.Result]:
-        """Wait for the end; return status and result."""
-        future = (handle or self.handle).get_result_async()
-        self.probe.wait_for(future.done, 'a result', limit_s)
-        return future.result().status, future.result().result
-
-    def wait_state(self, words: str, limit_s: float = 20.0) -> Deliver.Feedback:
-        """Wait for feedback of a state."""
-        self.probe.wait_for(
-            lambda: any(item.state == words for item in self.feedback),
-            f'feedback {words!r}, not only { {item.state for item in self.feedback} }',
-            limit_s,
-        )
-        return next(item for item in self.feedback if item.state == words)
-
-    def stands(self, duration_s: float = 0.5) -> bool:
-        """Return whether zero, and nothing else, is commanded for a while."""
-        seen = len(self.velocities)
-        self.probe.spin(duration_s)
-        new = self.velocities[seen:]
-        return bool(new) and all(m.linear.x == 0.0 and m.angular.z == 0.0 for m in new)
-
-
-@pytest.fixture
-def robot(make_robot: Callable[..., Any]) -> Any:
-    return make_robot('cmd_vel_nav')
-
-
-@pytest.fixture
-def customer(probe: Probe, room: Path) -> Customer:
-    probe.host(NavNode, parameter_overrides=[Parameter('scenario', value=str(room))])
-    return Customer(probe)
-
-
-def test_delivery_arrives_and_comes_home(customer: Customer, robot: Any) -> None:
+def test_delivery_arrives_and_comes_home(customer: Any, robot: Any) -> None:
     """To a table and back, with feedback, plan and the final result."""
     customer.send(table('table_1', 0.5), return_home=True)
     assert customer.handle.accepted
@@ -132,7 +73,7 @@ def test_delivery_arrives_and_comes_home(customer: Customer, robot: Any) -> None
     ],
 )
 def test_bad_stop_ends_the_delivery_with_its_reason(
-    customer: Customer, robot: Any, stop: Stop, words: str
+    customer: Any, robot: Any, stop: Stop, words: str
 ) -> None:
     customer.send(stop)
     status, result = customer.result(limit_s=10.0)
@@ -147,14 +88,14 @@ def test_bad_stop_ends_the_delivery_with_its_reason(
     assert any(words in item.key for item in reported.values)
 
 
-def test_delivery_without_stops_is_refused(customer: Customer) -> None:
+def test_delivery_without_stops_is_refused(customer: Any) -> None:
     customer.send()
     status, result = customer.result(limit_s=10.0)
     assert status == GoalStatus.STATUS_ABORTED
     assert 'at least one stop' in result.message
 
 
-def test_second_delivery_is_refused_while_busy(customer: Customer, robot: Any) -> None:
+def test_second_delivery_is_refused_while_busy(customer: Any, robot: Any) -> None:
     first = customer.send(table('table_2'))
     customer.wait_state('driving')
     second = customer.send(table('table_1'))
@@ -168,7 +109,7 @@ def test_second_delivery_is_refused_while_busy(customer: Customer, robot: Any) -
 
 @pytest.mark.parametrize('state', ['driving', 'waiting', 'waiting for localisation'])
 def test_cancel_stops_the_robot_and_tells_what_was_missed(
-    customer: Customer, robot: Any, state: str
+    customer: Any, robot: Any, state: str
 ) -> None:
     robot.localised = state != 'waiting for localisation'
     customer.send(table('table_1', 60.0), table('table_2'))
@@ -185,7 +126,7 @@ def test_cancel_stops_the_robot_and_tells_what_was_missed(
     assert customer.stands()
 
 
-def test_delivery_after_a_cancelled_one_is_taken(customer: Customer, robot: Any) -> None:
+def test_delivery_after_a_cancelled_one_is_taken(customer: Any, robot: Any) -> None:
     first = customer.send(table('table_2'))
     customer.wait_state('driving')
     future = first.cancel_goal_async()
@@ -195,7 +136,7 @@ def test_delivery_after_a_cancelled_one_is_taken(customer: Customer, robot: Any)
     assert customer.result()[1].reached == ['table_1']
 
 
-def test_robot_without_pose_waits(customer: Customer, robot: Any) -> None:
+def test_robot_without_pose_waits(customer: Any, robot: Any) -> None:
     robot.localised = False
     customer.send(table('table_1'))
     customer.wait_state('waiting for localisation')
@@ -204,7 +145,7 @@ def test_robot_without_pose_waits(customer: Customer, robot: Any) -> None:
     assert customer.result()[1].reached == ['table_1']
 
 
-def test_robot_without_heading_drives_gently_to_find_it(customer: Customer, robot: Any) -> None:
+def test_robot_without_heading_drives_gently_to_find_it(customer: Any, robot: Any) -> None:
     robot.heading_variance = 3.29
     customer.send(table('table_1'))
     customer.wait_state('finding its heading')
@@ -215,7 +156,7 @@ def test_robot_without_heading_drives_gently_to_find_it(customer: Customer, robo
     assert customer.result()[1].reached == ['table_1']
 
 
-def test_goal_pose_is_driven_to(customer: Customer, robot: Any) -> None:
+def test_goal_pose_is_driven_to(customer: Any, robot: Any) -> None:
     probe = customer.probe
     probe.speak(PoseStamped, 'goal_pose')
     probe.connected('goal_pose')
@@ -236,7 +177,7 @@ def test_goal_pose_is_driven_to(customer: Customer, robot: Any) -> None:
     ],
 )
 def test_bad_goal_pose_is_refused_with_its_reason(
-    customer: Customer, robot: Any, goal: PoseStamped, words: str
+    customer: Any, robot: Any, goal: PoseStamped, words: str
 ) -> None:
     probe = customer.probe
     probe.speak(PoseStamped, 'goal_pose')
@@ -246,7 +187,7 @@ def test_bad_goal_pose_is_refused_with_its_reason(
     assert customer.stands(0.3)
 
 
-def test_goal_pose_does_not_disturb_a_delivery(customer: Customer, robot: Any) -> None:
+def test_goal_pose_does_not_disturb_a_delivery(customer: Any, robot: Any) -> None:
     probe = customer.probe
     probe.speak(PoseStamped, 'goal_pose')
     customer.send(table('table_1'))
@@ -257,7 +198,7 @@ def test_goal_pose_does_not_disturb_a_delivery(customer: Customer, robot: Any) -
     assert customer.result()[1].reached == ['table_1']
 
 
-def test_waypoints_are_passed_in_their_order(customer: Customer, robot: Any) -> None:
+def test_waypoints_are_passed_in_their_order(customer: Any, robot: Any) -> None:
     probe = customer.probe
     probe.speak(PathMessage, 'waypoints')
     probe.connected('waypoints')
@@ -266,13 +207,13 @@ def test_waypoints_are_passed_in_their_order(customer: Customer, robot: Any) -> 
     probe.publish('waypoints', way)
     for x, y in ((1.6, 1.0), (1.6, 1.6)):
         probe.wait_for(
-            lambda x=x, y=y: math.hypot(robot.pose.x - x, robot.pose.y - y) < 0.2,
+            lambda x=x, y=y: math.hypot(robot.pose.x - x, robot.pose.y - y) < 0.25,
             f'the robot at {x}, {y}',
         )
     probe.wait_diagnostic('nav_controller', 'state', 'done')
 
 
-def test_empty_waypoints_are_refused(customer: Customer, robot: Any) -> None:
+def test_empty_waypoints_are_refused(customer: Any, robot: Any) -> None:
     probe = customer.probe
     probe.speak(PathMessage, 'waypoints')
     probe.connected('waypoints')
@@ -282,7 +223,7 @@ def test_empty_waypoints_are_refused(customer: Customer, robot: Any) -> None:
     probe.wait_diagnostic('nav_controller: waypoints', 'refused: path is empty', '1')
 
 
-def test_stop_for_something_in_the_way_is_told(customer: Customer, robot: Any) -> None:
+def test_stop_for_something_in_the_way_is_told(customer: Any, robot: Any) -> None:
     """What safety_state says comes back in the feedback."""
     probe = customer.probe
     probe.speak(DiagnosticStatus, 'safety_state')
@@ -312,7 +253,7 @@ def test_stamped_velocity_by_parameter(probe: Probe, room: Path) -> None:
     assert heard[0].header.frame_id == 'base_link'
 
 
-def test_speed_limit_changes_at_run_time(customer: Customer, robot: Any) -> None:
+def test_speed_limit_changes_at_run_time(customer: Any, robot: Any) -> None:
     probe = customer.probe
     assert probe.set_parameter('nav_controller', 'limits.max_speed', 0.2) == ''
     customer.send(table('table_1'))
@@ -328,7 +269,7 @@ def test_speed_limit_changes_at_run_time(customer: Customer, robot: Any) -> None
     [
         ({}, 'scenario'),
         ({'scenario': 'nowhere.yaml'}, 'nowhere.yaml'),
-        ({'scenario': 'nowhere.yaml', 'controller': 'magic'}, 'one of pure_pursuit'),
+        ({'scenario': 'nowhere.yaml', 'controller': 'magic'}, 'one of fuzzy, pure_pursuit'),
         ({'scenario': 'nowhere.yaml', 'limits.max_speed': 'fast'}, 'limits.max_speed'),
     ],
 )
@@ -341,9 +282,9 @@ def test_bad_parameter_ends_with_code_2(
 
 
 def test_process_ends_cleanly_during_a_delivery(
-    probe: Probe, processes: Processes, room: Path, robot: Any
+    probe: Probe, processes: Processes, room: Path, robot: Any, make_customer: Any
 ) -> None:
-    customer = Customer(probe)
+    customer = make_customer(probe)
     process = processes.node('nav_controller', 'nav_controller', {'scenario': str(room)})
     probe.wait_for(customer.client.server_is_ready, 'the deliver action')
     # An answer is lost while the server has not found its client: this one comes after it.

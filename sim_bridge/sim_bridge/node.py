@@ -49,7 +49,7 @@ class SimBridge(Node):
         self._ticks = 0
         self._contacts: Counter[str] = Counter()
         self._reported = (steady_ns(), self._sim.now_ns)
-        self._outlets = Outlets(self, self._config, scenario.robot)
+        self._outlets = Outlets(self, self._config, scenario)
         self._diagnostics = Diagnostics(self, hardware_id='simulation')
         self._diagnostics.watch('cmd_vel')
         self._diagnostics.describe(self._describe)

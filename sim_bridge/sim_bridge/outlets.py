@@ -10,21 +10,24 @@ from geometry_msgs.msg import PoseArray
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState, MagneticField, Range
+from sensor_msgs.msg import CameraInfo, Image, Imu, JointState, MagneticField, Range
 
 from sim_bridge.convert import contact_to_message, people_to_message, truth_to_message
 from sim_bridge.params import BridgeConfig
-from tablerunner.scenario import RobotGeometry
+from tablerunner.scenario import Scenario
 from tablerunner.simulation import Contact, PersonState, Sample, Truth
 from tablerunner.types import (
     ExchangeSample,
+    ImageSample,
     ImuSample,
+    Lens,
     MagneticSample,
     UltrasonicSample,
     WheelSample,
 )
 from tablerunner_interfaces.msg import UwbExchange
 from tablerunner_ros.conversions.exchange import exchange_to_message
+from tablerunner_ros.conversions.image import image_to_message, lens_to_message
 from tablerunner_ros.conversions.imu import imu_to_message, magnetic_to_message
 from tablerunner_ros.conversions.stamp import fill_stamp
 from tablerunner_ros.conversions.ultrasonic import ultrasonic_to_message
@@ -39,11 +42,12 @@ class Outlets:
     ----------
     node : rclpy.node.Node
     config : BridgeConfig
-    robot : RobotGeometry
-        Its ultrasonic sensors have a topic each, ``ultrasonic/NAME``.
+    scenario : Scenario
+        Its robot's ultrasonic sensors have a topic each, ``ultrasonic/NAME``; a camera's pictures
+        come with its lens as it was measured, not as it is.
     """
 
-    def __init__(self, node: Node, config: BridgeConfig, robot: RobotGeometry) -> None:
+    def __init__(self, node: Node, config: BridgeConfig, scenario: Scenario) -> None:
         self._config = config
 
         def topic(type_: type[Any], name: str) -> Callable[[Any], None]:
@@ -58,7 +62,8 @@ class Outlets:
         truth = topic(Odometry, 'ground_truth')
         contacts = topic(DiagnosticStatus, 'contacts')
         sonars = {
-            mount.frame: topic(Range, f'ultrasonic/{mount.name}') for mount in robot.ultrasonics
+            mount.frame: topic(Range, f'ultrasonic/{mount.name}')
+            for mount in scenario.robot.ultrasonics
         }
         joints = (config.left_joint, config.right_joint)
         frames = (config.map_frame, config.base_frame)
@@ -71,6 +76,19 @@ class Outlets:
             Truth: lambda s: truth(truth_to_message(s, *frames)),
             Contact: lambda s: contacts(contact_to_message(s)),
         }
+        camera = scenario.camera
+        if camera is not None:
+            lens = Lens(
+                camera.width, camera.height, camera.focal, camera.middle, camera.distortion
+            )
+            images = topic(Image, 'camera/image_raw')
+            infos = topic(CameraInfo, 'camera/camera_info')
+
+            def publish_picture(sample: ImageSample) -> None:
+                infos(lens_to_message(lens, sample.stamp, config.camera_frame))
+                images(image_to_message(sample, config.camera_frame))
+
+            self._by_type[ImageSample] = publish_picture
 
     def publish_clock(self, now_ns: int) -> None:
         """Publish the simulated time."""

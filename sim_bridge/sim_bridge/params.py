@@ -30,6 +30,9 @@ class BridgeConfig(Config):
     base_frame: str = parameter('base_link', description='frame of the robot')
     imu_frame: str = parameter('imu_link', description='frame of IMU and magnetometer')
     tag_frame: str = parameter('uwb_tag', description='frame of the UWB tag antenna')
+    camera_frame: str = parameter(
+        'ceiling_camera', description='frame of the camera under the ceiling'
+    )
     left_joint: str = parameter('left_wheel_joint', description='name of the left wheel joint')
     right_joint: str = parameter('right_wheel_joint', description='name of the right wheel joint')
     cmd_vel_type: str = parameter(

@@ -25,6 +25,7 @@ setup(
         'matplotlib',
         'rich',
         'filterpy',
+        'opencv-python-headless',
         'rosbags',
         'typer',
     ],

@@ -20,6 +20,7 @@ setup(
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.launch.py'))),
         (f'share/{PACKAGE}/params', sorted(glob('params/*.yaml'))),
         (f'share/{PACKAGE}/scenarios', sorted(glob('scenarios/*.yaml'))),
+        (f'share/{PACKAGE}/dds', sorted(glob('dds/*.xml'))),
         (f'share/{PACKAGE}/rviz', sorted(glob('rviz/*.rviz'))),
     ],
     install_requires=['setuptools'],

@@ -28,7 +28,7 @@ PARTS = [
 ]
 # Beyond the order: the controller works with any estimate, and the simulator must not share a
 # measurement model (and its bugs) with what it tests.
-FORBIDDEN = {'control': {'estimation'}, 'simulation': {'estimation', 'control'}}
+FORBIDDEN = {'control': {'estimation'}, 'simulation': {'vision', 'estimation', 'control'}}
 
 
 def parts_imported(source: str, package: tuple[str, ...]) -> Iterator[tuple[int, str]]:
@@ -90,6 +90,7 @@ def test_parts_import_only_from_parts_before_them() -> None:
         ('control', 'from tablerunner.estimation.ekf import Ekf'),
         ('simulation', 'from tablerunner.estimation import models'),
         ('simulation', 'from tablerunner.control import fuzzy'),
+        ('simulation', 'from tablerunner.vision import distort'),
         ('bags', 'def f():\n    from tablerunner.cli import main'),
     ],
 )

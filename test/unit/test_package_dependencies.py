@@ -24,6 +24,7 @@ KEYS = {
     'typer': 'python3-typer',
     'psutil': 'python3-psutil',
     'filterpy': 'python3-filterpy-pip',
+    'cv2': 'python3-opencv',
     'hypothesis': 'python3-hypothesis',
     'pytest': 'python3-pytest',
 }

@@ -167,6 +167,29 @@ UNKNOWN_YAW_VARIANCE = float(np.pi**2 / 3.0)
 """Variance of a heading of which nothing is known (uniform over a turn) [rad^2]."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageSample:
+    """A colour picture; its stamp is the middle of the exposure."""
+
+    stamp: int
+    pixels: NDArray[np.uint8]  # (height, width, 3): blue, green, red
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """What a pinhole camera with the distortion 'plumb_bob' does to rays (sensor_msgs/CameraInfo).
+
+    Pixel (0, 0) is the middle of the one in the upper left corner; x to the right, y down.
+    """
+
+    width: int  # [pixel]
+    height: int  # [pixel]
+    focal: tuple[float, float]  # fx, fy [pixel]
+    centre: tuple[float, float]  # cx, cy [pixel]
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    # k1, k2, p1, p2, k3
+
+
 @dataclass(frozen=True, slots=True)
 class UltrasonicSample:
     """Distance from one ultrasonic sensor to the nearest echo [m]; inf where nothing echoed."""
@@ -177,6 +200,17 @@ class UltrasonicSample:
     min_range_m: float
     max_range_m: float
     field_of_view_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class PersonSample:
+    """Where a person with a tag is and how the person walks, along the axes of base_link."""
+
+    stamp: int
+    tag_id: str
+    position: tuple[float, float]  # of the tag [m]
+    velocity: tuple[float, float]  # over the floor [m/s]
+    covariance: Matrix  # (4, 4): position and velocity; inf: a velocity that is not known
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +233,7 @@ class Estimate(NamedTuple):
     covariance: Matrix  # (n, n)
     twist: tuple[float, float] = (0.0, 0.0)  # forward [m/s] and turn rate [rad/s], last step
     memory: tuple[float, ...] = ()  # running statistics that the estimator keeps for itself
+    carried: object = None  # what else it keeps: the particles of a particle filter
 
     @property
     def pose(self) -> Pose2:

@@ -64,7 +64,7 @@ def describe(values: Mapping[str, str]) -> tuple[DescribedNode, ...]:
             files,
             spec.remap,
         )
-        for spec in nodes_of(run)
+        for spec in nodes_of(run, scenario)
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -49,9 +50,9 @@ class LaunchOptions:
     output: Path | None = None
 
 
-def default_scenario() -> Path:
-    """Return the restaurant's file among the installed share files."""
-    return find_share('tablerunner_bringup') / 'scenarios' / 'restaurant.yaml'
+def default_scenario(name: str = 'restaurant') -> Path:
+    """Return the file of a scenario among the installed share files."""
+    return find_share('tablerunner_bringup') / 'scenarios' / f'{name}.yaml'
 
 
 def launch(options: LaunchOptions, progress: Progress) -> int:
@@ -107,10 +108,12 @@ def deliver(
     return_home: bool,
     progress: Progress,
     limits: Limits | None = None,
+    meanwhile: Callable[[Any], str] | None = None,
 ) -> Outcome | None:
     """Send a delivery and follow it to its end; None when the run was asked to end meanwhile.
 
-    Beyond its limits it counts as failed and is cancelled.
+    Beyond its limits it counts as failed and is cancelled. `meanwhile` is called again and again
+    with the newest feedback; what it returns is said.
     """
     delivery = Delivery(session.node('tablerunner_delivery'), stops, wait_s, return_home)
     try:
@@ -123,7 +126,7 @@ def deliver(
             return Outcome(False, 'nobody offers the deliver action')
         delivery.send()
         progress.say('delivery to ' + ', '.join(stops))
-        follower = _Follower(session, delivery, progress, limits or Limits())
+        follower = _Follower(session, delivery, progress, limits or Limits(), meanwhile)
         if not session.wait(follower.is_done, follower.words):
             delivery.cancel()
             return None
@@ -146,12 +149,18 @@ class _Follower:
     """Spins a delivery along with a session and says when its state changes."""
 
     def __init__(
-        self, session: Session, delivery: Delivery, progress: Progress, limits: Limits
+        self,
+        session: Session,
+        delivery: Delivery,
+        progress: Progress,
+        limits: Limits,
+        meanwhile: Callable[[Any], str] | None,
     ) -> None:
         self._session = session
         self._delivery = delivery
         self._progress = progress
         self._limits = limits
+        self._meanwhile = meanwhile
         self._begun = elapsed_s(session)
         self._begun_wall = time.monotonic()
         self._said = ('', '')
@@ -161,6 +170,9 @@ class _Follower:
         """Handle what has come; return whether the delivery ended or its time is up."""
         self._delivery.spin(0.0)
         self._tell()
+        words = '' if self._meanwhile is None else self._meanwhile(self._delivery.feedback)
+        if words:
+            self._progress.say(f'{elapsed_s(self._session):6.1f} s  {words}')
         return (
             self._delivery.outcome is not None
             or elapsed_s(self._session) - self._begun > self._limits.measured_s
@@ -220,8 +232,8 @@ def tell_ending(ending: Ending, progress: Progress) -> None:
         progress.say(f'    {line}')
 
 
-def scenario_of(run: RunOptions) -> tuple[RunOptions, Scenario]:
+def scenario_of(run: RunOptions, default: str = 'restaurant') -> tuple[RunOptions, Scenario]:
     """Return options with the scenario's path filled in, and the scenario."""
     if not run.scenario:
-        run = run.replace(scenario=str(default_scenario()))
+        run = run.replace(scenario=str(default_scenario(default)))
     return run, load_scenario(run.scenario_path)

@@ -68,13 +68,17 @@ class Monitor:
         self._contacts = node.create_subscription(
             DiagnosticStatus, 'contacts', never_called, qos_for('contacts', subscriber=True)
         )
+        self._safety = Newest(
+            node, DiagnosticStatus, 'safety_state', qos_for('safety_state', subscriber=True)
+        )
         self._emergency_stop = node.create_client(Trigger, 'emergency_stop')
+        self._release = node.create_client(Trigger, 'release')
         self.statuses: dict[str, DiagnosticStatus] = {}
         self.touches: list[Touch] = []
 
     def poll(self) -> None:
         """Take what has come since the last call."""
-        for newest in (self._estimate, self._truth, self._odom):
+        for newest in (self._estimate, self._truth, self._odom, self._safety):
             newest.poll()
         for array, _ in take_all(self._diagnostics):
             self.statuses.update({status.name: status for status in array.status})
@@ -92,6 +96,18 @@ class Monitor:
         """Tell the safety stop to brake and to hold; nothing happens when it is not there."""
         if self._emergency_stop.service_is_ready():
             self._emergency_stop.call_async(Trigger.Request())
+
+    def release_robot(self) -> None:
+        """Tell the safety stop to end an emergency stop."""
+        if self._release.service_is_ready():
+            self._release.call_async(Trigger.Request())
+
+    @property
+    def emergency(self) -> bool:
+        """Whether the safety stop says that it holds the robot for an emergency."""
+        status = self._safety.message
+        values = {} if status is None else {item.key: item.value for item in status.values}
+        return values.get('emergency') == 'true'
 
     @property
     def estimate(self) -> Movement | None:

@@ -20,12 +20,20 @@ class NodeSpec:
     executable: str
     parameters: Callable[[Scenario, RunOptions], dict[str, Any]]
     simulation_only: bool = False
+    needed: Callable[[Scenario], bool] = lambda scenario: True
     remap: tuple[tuple[str, str], ...] = ()
 
 
 NODES: tuple[NodeSpec, ...] = (
     NodeSpec('uwb_driver', 'uwb_driver', 'uwb_driver', parameters.uwb_driver),
     NodeSpec('odom_node', 'odom_node', 'odom_node', parameters.odom_node),
+    NodeSpec(
+        'ceiling_camera',
+        'ceiling_camera',
+        'ceiling_camera',
+        parameters.ceiling_camera,
+        needed=lambda scenario: scenario.camera is not None,
+    ),
     NodeSpec('fusion_node', 'fusion_node', 'fusion_node', parameters.fusion_node),
     NodeSpec('safety_stop', 'nav_controller', 'safety_stop', parameters.safety_stop),
     NodeSpec('nav_controller', 'nav_controller', 'nav_controller', parameters.nav_controller),
@@ -45,6 +53,10 @@ COMMANDING = 'nav_controller'
 """The node whose end takes the command away: the safety stop behind it goes to zero on silence."""
 
 
-def nodes_of(options: RunOptions) -> tuple[NodeSpec, ...]:
-    """Return the nodes of a run: on a real robot none that simulates."""
-    return tuple(spec for spec in NODES if options.simulated or not spec.simulation_only)
+def nodes_of(options: RunOptions, scenario: Scenario) -> tuple[NodeSpec, ...]:
+    """Return the nodes of a run: on a real robot none that simulates, and what the room needs."""
+    return tuple(
+        spec
+        for spec in NODES
+        if (options.simulated or not spec.simulation_only) and spec.needed(scenario)
+    )

@@ -17,6 +17,7 @@ from typing import Any
 
 import yaml
 
+from ceiling_camera.params import CeilingCameraConfig
 from fusion_node.params import FusionNodeConfig
 from nav_controller.params import NavNodeConfig, SafetyNodeConfig
 from odom_node.params import OdomNodeConfig
@@ -25,6 +26,7 @@ from tablerunner.config import Config, Parameter, parameters_of
 from tablerunner.estimation import LocalizerConfig, SmootherConfig
 from tablerunner.odometry import OdometerConfig
 from tablerunner.uwb import AnchorHealthConfig, PositionerConfig, RangerConfig
+from tablerunner.vision import LocatorConfig
 from tablerunner_ros.stamps import StampConfig
 from uwb_driver.params import UwbDriverConfig
 
@@ -36,6 +38,7 @@ CONFIGS: dict[str, tuple[type[Config], ...]] = {
         PositionerConfig,
         AnchorHealthConfig,
     ),
+    'ceiling_camera': (CeilingCameraConfig, StampConfig, LocatorConfig),
     'odom_node': (OdomNodeConfig, StampConfig, OdometerConfig),
     'fusion_node': (FusionNodeConfig, StampConfig, SmootherConfig, LocalizerConfig),
     'nav_controller': (NavNodeConfig,),

@@ -5,6 +5,7 @@ What a node's Config has a default for and the scenario says nothing of is left 
 
 from __future__ import annotations
 
+import colorsys
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,30 @@ def odom_node(scenario: Scenario, options: RunOptions) -> Parameters:
             'track': float(scenario.robot.track),
         },
     }
+
+
+def ceiling_camera(scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return where the camera was measured to hang, and the marker that the robot wears."""
+    told: Parameters = _common(options)
+    camera, marker = scenario.camera, scenario.robot.marker
+    if camera is not None:
+        told['mount'] = {
+            'position': [float(number) for number in camera.position],
+            'yaw': float(camera.yaw),
+            'tilt': [float(number) for number in camera.tilt],
+        }
+    if marker is not None:
+        red, green, blue = (number / 255.0 for number in marker.colour)
+        told['marker'] = {
+            'robots': ['robot'],
+            'hues': [round(360.0 * colorsys.rgb_to_hsv(red, green, blue)[0], 1)],
+            'heights': [float(marker.height)],
+            'disc_x': float(marker.disc_x),
+            'disc_radius': float(marker.disc_radius),
+            'front_x': float(marker.front_x),
+            'front_radius': float(marker.front_radius),
+        }
+    return told
 
 
 def fusion_node(scenario: Scenario, options: RunOptions) -> Parameters:

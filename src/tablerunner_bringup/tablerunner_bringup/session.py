@@ -22,6 +22,7 @@ from tablerunner_bringup import domains, parameters
 from tablerunner_bringup.child import Command, Ending
 from tablerunner_bringup.executables import find_executable
 from tablerunner_bringup.interrupts import Interrupts
+from tablerunner_bringup.large_messages import allow_large_messages
 from tablerunner_bringup.monitor import Monitor
 from tablerunner_bringup.nodes import COMMANDING, NodeSpec, nodes_of
 from tablerunner_bringup.polling import bare_node
@@ -93,7 +94,7 @@ class Session:
         self._progress = progress
         self._interrupts = interrupts
         self._supervisor = Supervisor(_LIMITS)
-        self._specs = nodes_of(options)
+        self._specs = nodes_of(options, scenario)
         self._stack = contextlib.ExitStack()
         self._domain: int | None = None
         self._up_at = time.monotonic()
@@ -116,6 +117,8 @@ class Session:
         if self._options.simulated:
             # For this process too: its own nodes must hear no more and no less than the others.
             os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+        if self._scenario.camera is not None:
+            allow_large_messages(os.environ)
         self._domain = self._choose_domain()
         self._progress.say(f'run in {self.folder.path}, ROS domain {self._domain_words}')
         self.monitor = Monitor(self.node('tablerunner_launcher'))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tablerunner_bringup.checks import Check
 from tablerunner_bringup.delivery import Outcome
 from tablerunner_bringup.demo import Trip
 from tablerunner_bringup.monitor import Touch
@@ -16,7 +17,7 @@ BUMPED = Touch('the robot was touched by guest', 'person', robot_at_fault=False)
 
 def trip(outcome: Outcome | None, *touches: Touch) -> Trip:
     """Return a trip to table_3."""
-    return Trip('table_3', outcome, touches, 60.0, 0.03)
+    return Trip(('table_3',), outcome, touches)
 
 
 def test_trip_arrived_and_nobody_hit_is_no_failure():
@@ -40,3 +41,14 @@ def test_trip_missed_hit_or_cut_short_is_a_failure(outcome, touches, words):
     """Each way to fail is said in words."""
     (failure,) = trip(outcome, *touches).failures
     assert words in failure
+
+
+def test_facts_hold_what_each_check_was_judged_by():
+    """Meals may be delivered although a check failed; both are told."""
+    check = Check('emergency stop', False, 'never tried', {'speed_m_s': 0.5})
+    facts = trip(REACHED).facts(1, ['emergency stop: never tried'], [check])
+    assert facts['delivered'] is True
+    assert facts['failures'] == ['emergency stop: never tried']
+    assert facts['checks'] == {
+        'emergency stop': {'passed': False, 'words': 'never tried', 'speed_m_s': 0.5}
+    }

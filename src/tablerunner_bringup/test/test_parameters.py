@@ -92,7 +92,7 @@ def test_parameters_real_robot_uses_system_time(odd):
     """Without a simulation there is no /clock to wait for, and no sim_bridge."""
     scenario, options = odd
     real = options.replace(simulated=False)
-    specs = nodes_of(real)
+    specs = nodes_of(real, scenario)
     assert 'sim_bridge' not in {spec.name for spec in specs}
     assert COMMANDING in {spec.name for spec in specs}
     assert not any(spec.parameters(scenario, real)['use_sim_time'] for spec in specs)

@@ -32,6 +32,7 @@ def test_qos_publisher_and_subscriber_are_compatible(topic: str) -> None:
         ('camera/image_raw', False, 5, False),
         ('camera/camera_info', False, 5, False),
         ('camera/pose', True, 10, False),
+        ('camera/debug_image', False, 5, False),
         ('odom', True, 10, False),
         ('odometry/filtered', True, 10, False),
         ('pose', True, 10, False),

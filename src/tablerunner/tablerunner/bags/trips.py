@@ -162,11 +162,24 @@ def _halts(bag: BagReader, trip: Trip, namespace: str) -> tuple[Halt, ...]:
     ]
     places = trip.places(begin for begin, _ in spans)
     people = _people(bag, namespace)
-    return tuple(
-        Halt(begin, seconds(end - begin), float(x), float(y), _nearest(people, begin, end, x, y))
-        for (begin, end), (x, y) in zip(spans, places, strict=True)
-        if math.isfinite(x)
-    )
+    emergencies = _emergencies(bag, namespace)
+    halts = []
+    for (begin, end), (x, y) in zip(spans, places, strict=True):
+        emergency = any(begin <= stamp <= end for stamp in emergencies)
+        person = None if emergency else _nearest(people, begin, end, x, y)
+        if math.isfinite(x):
+            halts.append(Halt(begin, seconds(end - begin), float(x), float(y), person, emergency))
+    return tuple(halts)
+
+
+def _emergencies(bag: BagReader, namespace: str) -> list[int]:
+    """Return when the safety stop said that an emergency stop held the robot [ns]."""
+    topic = full_name('safety_state', namespace)
+    return [
+        received
+        for _, received, _, message in bag.messages([topic] if bag.topic(topic) else [])
+        if any(item.key == 'emergency' and item.value == 'true' for item in message.values)
+    ]
 
 
 def _held(bag: BagReader, namespace: str) -> Iterator[tuple[int, int]]:

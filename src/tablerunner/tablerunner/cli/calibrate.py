@@ -1,10 +1,11 @@
-"""`tablerunner calibrate`: what sensors read wrong, from a bag in which the truth is known."""
+"""`tablerunner calibrate`: what sensors read wrong, from recordings where the truth is known."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
+from tablerunner.cli.calibrate_camera import camera
 from tablerunner.errors import ConfigError, GeometryError
 
 if TYPE_CHECKING:
@@ -20,14 +21,17 @@ WORST_NOISE_M = 0.5
 """No radio's ranges scatter as much: the true places must be wrong."""
 
 calibrate_app = typer.Typer(
-    help='Find what sensors read wrong, from a bag in which the truth is known.',
+    help='Find what sensors read wrong: ranges from a bag, a camera from pictures.',
     no_args_is_help=True,
 )
 
 
 @calibrate_app.callback()
 def calibrate() -> None:
-    """Find what sensors read wrong, from a bag in which the truth is known."""
+    """Find what sensors read wrong: ranges from a bag, a camera from pictures."""
+
+
+calibrate_app.command()(camera)
 
 
 @calibrate_app.command()

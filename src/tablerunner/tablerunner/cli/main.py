@@ -12,8 +12,10 @@ import typer
 from tablerunner.cli.calibrate import calibrate_app
 from tablerunner.cli.compare import compare
 from tablerunner.cli.convert import convert_app
+from tablerunner.cli.drive_test import drive_test
 from tablerunner.cli.exits import BAD_INPUT, DONE, FAILED
 from tablerunner.cli.explain_rule import explain_rule
+from tablerunner.cli.follow_test import follow_test
 from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
@@ -42,7 +44,9 @@ def make_app() -> typer.Typer:
     app.command()(tune)
     app.command()(reproduce)
     app.command()(compare)
+    app.command()(drive_test)
     app.command()(explain_rule)
+    app.command()(follow_test)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')
     for entry in sorted(entry_points(group=GROUP), key=lambda item: item.name):

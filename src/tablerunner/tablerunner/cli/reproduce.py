@@ -17,7 +17,10 @@ def reproduce(
     name: Annotated[
         str, typer.Argument(metavar='NAME', help='Which experiment; without it they are listed.')
     ] = '',
-    seeds: Annotated[int, typer.Option(metavar='N', min=1, help='How many seeds to run.')] = 20,
+    seeds: Annotated[
+        Optional[int],
+        typer.Option(metavar='N', min=1, help='How many seeds to run; 20, of pf_uiekf 100.'),
+    ] = None,
     first_seed: Annotated[
         int, typer.Option('--seed', metavar='N', min=0, help='The first of the seeds.')
     ] = 0,
@@ -49,7 +52,13 @@ def reproduce(
     from tablerunner.cli.bar import Bar
     from tablerunner.cli.json_file import write_json
     from tablerunner.evaluation.plots.sheet import write_sheet
-    from tablerunner.experiments.registry import EXPERIMENTS, RECORDED, require_experiment
+    from tablerunner.experiments.registry import (
+        EXPERIMENTS,
+        MORE_SEEDS,
+        RECORDED,
+        USUAL_SEEDS,
+        require_experiment,
+    )
 
     if not name:
         for known in (*EXPERIMENTS, *RECORDED):
@@ -60,7 +69,8 @@ def reproduce(
         if name in RECORDED:
             outcome = RECORDED[name](data, bar.show)
         else:
-            outcome = EXPERIMENTS[name](range(first_seed, first_seed + seeds), bar.show)
+            count = seeds or MORE_SEEDS.get(name, USUAL_SEEDS)
+            outcome = EXPERIMENTS[name](range(first_seed, first_seed + count), bar.show)
     console = Console(highlight=False, width=None if Console().is_terminal else 120)
     console.print(table_of(outcome))
     for note in outcome.notes:

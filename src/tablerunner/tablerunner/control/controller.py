@@ -7,6 +7,7 @@ from typing import Protocol
 
 from tablerunner.control.follower_config import FollowerConfig
 from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.fuzzy.trace import Trace
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.path import Path
 from tablerunner.geometry.pose import Pose2
@@ -49,6 +50,13 @@ class Controller(Protocol):
 
     def configure(self, config: FollowerConfig, limits: VelocityLimits) -> None:
         """Use other settings from now on."""
+
+    def explain(self, wanted: bool) -> None:
+        """Keep the reasons of each step from now on, or no longer."""
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """What rule bases decided in the last step; empty where none did or none is asked for."""
 
     def halt(self, dt: float) -> Velocity:
         """Return the next velocity of coming to a stand, whatever the path."""

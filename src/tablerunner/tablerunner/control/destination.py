@@ -21,6 +21,8 @@ class MissionState(str, Enum):
     BLOCKED = 'blocked'
     HELD = 'held by the safety stop'
     WAITING = 'waiting'
+    HANDING_OVER = 'waiting for confirmation'
+    PAUSED = 'paused'
     RETURNING = 'returning'
     DONE = 'done'
     CANCELLED = 'cancelled'
@@ -46,7 +48,9 @@ class Destination:
     pose : Pose2
         Of base_link in map.
     wait_s : float
-        How long to stand there [s].
+        How long to stand there at least [s].
+    confirm_s : float
+        How long to wait there for a confirmation at most, from the arrival [s]; 0: none is wanted.
     keep_heading : bool
         Whether the heading of `pose` is asked for.
     """
@@ -54,6 +58,7 @@ class Destination:
     name: str
     pose: Pose2
     wait_s: float = 0.0
+    confirm_s: float = 0.0
     keep_heading: bool = True
 
 
@@ -107,6 +112,8 @@ class MissionStatus:
     reached : tuple of str
     missed : tuple of (str, str)
         Names of stops and why.
+    unconfirmed : tuple of str
+        Stops that were reached and where nobody confirmed in time.
     events : tuple of str
         What happened in this step, in words.
     message : str
@@ -120,5 +127,6 @@ class MissionStatus:
     path: Path | None = None
     reached: tuple[str, ...] = ()
     missed: tuple[tuple[str, str], ...] = ()
+    unconfirmed: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
     message: str = ''

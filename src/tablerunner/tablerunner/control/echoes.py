@@ -77,7 +77,7 @@ class Heard:
         Whether it was measured to come nearer by itself, at walking pace.
     beside : ndarray of bool, shape (n,)
         Whether a sensor heard it that looks to the side.
-    sensors : tuple of str
+    sensors : ndarray of str, shape (n,)
     """
 
     points: Vector
@@ -85,7 +85,7 @@ class Heard:
     closing: NDArray[np.bool_]
     nearing: NDArray[np.bool_]
     beside: NDArray[np.bool_]
-    sensors: tuple[str, ...]
+    sensors: NDArray[np.str_]
 
 
 class EchoMemory:
@@ -106,6 +106,7 @@ class EchoMemory:
         self.mounts = dict(mounts)
         self.times = times
         self._names = tuple(mounts)
+        self._names_by_number = np.array(self._names)
         self._beside = np.array(
             [abs(difference(mount.heading, 0.0)) >= _SIDE_RAD for mount in mounts.values()]
         )
@@ -286,5 +287,5 @@ class EchoMemory:
             newest & closing[self._sensors],
             newest & nearing[self._sensors],
             self._beside[self._sensors],
-            tuple(self._names[number] for number in self._sensors),
+            self._names_by_number[self._sensors],
         )

@@ -11,6 +11,7 @@ import math
 from tablerunner.control.controller import Drive
 from tablerunner.control.follower_config import FollowerConfig
 from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.fuzzy.trace import Trace
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.path import Path
 from tablerunner.geometry.angles import difference
@@ -43,6 +44,14 @@ class PurePursuit:
 
     def hear(self, readings: Readings) -> None:
         """Take readings and leave it at that: the path is all that counts here."""
+
+    def explain(self, wanted: bool) -> None:
+        """Leave it at that too: no rules decide here."""
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """Nothing: no rules decide here."""
+        return ()
 
     def follow(self, path: Path) -> None:
         """Take a new path; the velocity carries on from the last one."""

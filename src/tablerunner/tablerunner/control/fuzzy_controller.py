@@ -17,6 +17,7 @@ from tablerunner.control.controller import Drive
 from tablerunner.control.follower_config import FollowerConfig
 from tablerunner.control.fuzzy.reactive import ReactiveConfig, ReactiveController
 from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.fuzzy.trace import Trace
 from tablerunner.control.fuzzy.track_keeper import TrackConfig, TrackKeeper
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.path import Path
@@ -26,7 +27,6 @@ from tablerunner.types import Velocity
 
 _HALF_CONE_RAD = 0.24
 _BACK_M, _ON_M = 0.3, 1.0  # progress along the path in one step
-_ENOUGH = 3  # steps in a row in which something is in the way
 _LAST_M = 0.3  # from here on straight to the end
 
 
@@ -36,6 +36,15 @@ class DetourConfig(Config):
 
     notice: float = parameter(
         0.8, description='Something in the path is heard so near', unit='m', above=0.0
+    )
+    stand: float = parameter(
+        0.35, description='So near the robot waits before it', unit='m', low=0.0
+    )
+    wait: float = parameter(
+        3.0,
+        description='So long it must stand there: people walk on, and another path may come',
+        unit='s',
+        low=0.0,
     )
     half_width: float = parameter(
         0.3, description='In the path is what is so near its middle', unit='m', above=0.0
@@ -87,13 +96,16 @@ class FuzzyController:
         self._path: Path | None = None
         self._readings: Readings | None = None
         self._velocity = Velocity()
+        self._explained = False
+        self._traces: tuple[Trace, ...] = ()
         self._begin()
 
     def _begin(self) -> None:
         self._arc = 0.0
         self._at_end = False
         self._around = False
-        self._seen = 0
+        self._seen_s = 0.0
+        self._near_m = math.inf  # distance of what stands in the path
         self.blocked_by = ''
 
     def hear(self, readings: Readings) -> None:
@@ -106,6 +118,24 @@ class FuzzyController:
         self.limits = limits
         self._navigator.reactive.limits = limits
 
+    def tune(self, track: TrackConfig, reactive: ReactiveConfig) -> None:
+        """Use other settings of the rule bases' surroundings from now on."""
+        self._keeper.config = track
+        self._navigator.reactive.config = reactive
+
+    def explain(self, wanted: bool) -> None:
+        """Keep the reasons of each step from now on, or no longer."""
+        self._explained = self._navigator.traced = wanted
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """What rule bases decided in the last step.
+
+        That of the track while correcting, those of corner and speed on the way round something;
+        empty otherwise, and where `explain` did not ask.
+        """
+        return self._traces
+
     def follow(self, path: Path) -> None:
         """Take a new path; the velocity carries on from the last one."""
         self._path = path
@@ -115,6 +145,7 @@ class FuzzyController:
 
     def halt(self, dt: float) -> Velocity:
         """Return the next velocity of coming to a stand."""
+        self._traces = ()
         self._velocity = self.limits.approach(self._velocity, Velocity(), dt)
         return self._velocity
 
@@ -132,6 +163,7 @@ class FuzzyController:
         if not pose.is_finite:
             raise ValueError('the pose is not finite')
         readings, self._readings = self._readings, None
+        self._traces = ()
         end_x, end_y = path.end
         to_end = math.hypot(end_x - pose.x, end_y - pose.y)
         # On the way round the robot may be far ahead on the path already.
@@ -169,19 +201,20 @@ class FuzzyController:
         left: float,
     ) -> Velocity:
         if readings is not None:
-            ahead = self._in_the_path(pose, path, readings)
-            self._seen = self._seen + 1 if ahead else 0
-        if not self._around and self._seen >= _ENOUGH:
+            self._near_m = self._in_the_path(pose, path, readings)
+            self._seen_s = self._seen_s + dt if self._near_m < math.inf else 0.0
+        if not self._around and self._seen_s > self.detour.wait:
             self._around = True
             x, y = path.at(self._arc + self.detour.rejoin)
             self._navigator.go((float(x), float(y)))
         if self._around and readings is not None:
             step = self._navigator.step(readings, pose, dt)
+            self._traces = step.traces
             if step.mode is Mode.UNREACHABLE:
                 self.blocked_by = step.reason
                 return Velocity()
             back = step.mode is Mode.APPROACH and off <= self.detour.half_width
-            if not (step.mode is Mode.ARRIVED or (back and not self._seen)):
+            if not (step.mode is Mode.ARRIVED or (back and not self._seen_s)):
                 return step.velocity
             self._around = False
             self._keeper.follow(_rest(path, self._arc))
@@ -194,8 +227,13 @@ class FuzzyController:
         ends = self.ends
         braking = math.sqrt(2.0 * ends.approach_deceleration * left)
         speed = min(self.limits.max_speed, max(braking, ends.crawl_speed))
+        if self._near_m < math.inf:
+            room = max(self._near_m - self.detour.stand, 0.0)
+            speed = min(speed, math.sqrt(2.0 * ends.approach_deceleration * room))
         if len(path.points) > 1 and left > _LAST_M:
-            return self._keeper.step(pose, speed).velocity
+            step = self._keeper.step(pose, speed, self._explained)
+            self._traces = () if step.trace is None else (step.trace,)
+            return step.velocity
         end_x, end_y = path.end
         error = difference(math.atan2(end_y - pose.y, end_x - pose.x), pose.heading)
         if abs(error) > ends.turn_in_place_above:
@@ -207,9 +245,12 @@ class FuzzyController:
         rate = min(max(rate, self.ends.turn_rate_min), self.limits.max_turn_rate)
         return Velocity(0.0, math.copysign(rate, error))
 
-    def _in_the_path(self, pose: Pose2, path: Path, readings: Readings) -> bool:
-        """Return whether what a sensor hears ahead stands in the path, wherever in its cone."""
-        detour = self.detour
+    def _in_the_path(self, pose: Pose2, path: Path, readings: Readings) -> float:
+        """Return how near a sensor hears something ahead in the path [m]; inf: there is nothing.
+
+        It stands in the path when it does so wherever in its cone it is.
+        """
+        detour, nearest = self.detour, math.inf
         for sensor in (1, 2, 3):
             distance, mount = readings.distances_m[sensor], self._mounts[sensor]
             if not distance <= detour.notice or readings.ages_s[sensor] > 0.5:
@@ -220,8 +261,8 @@ class FuzzyController:
                 arc, off = path.project(at.x, at.y, self._arc, self._arc + 1.5)
                 inside = inside and off <= detour.half_width and arc > self._arc
             if inside:
-                return True
-        return False
+                nearest = min(nearest, distance)
+        return nearest
 
 
 def _rest(path: Path, arc: float) -> Path:

@@ -6,40 +6,29 @@ states there are and what leads from one to the other: docs/navigation.md.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
 from tablerunner.control.alignment import AlignmentDrive
 from tablerunner.control.controller import Controller, Drive
 from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
-from tablerunner.control.floor_map import Disc
+from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.hand_over import HandOver
+from tablerunner.control.leg import Leg
 from tablerunner.control.look_around import LookAround
+from tablerunner.control.lost_watch import LostWatch
+from tablerunner.control.marks import Marks, disc_ahead
 from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner
 from tablerunner.control.progress import ProgressWatch
+from tablerunner.control.surroundings import Surroundings
+from tablerunner.control.tour import Tour, check_stops
+from tablerunner.control.way_finder import WayFinder
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Velocity, nanoseconds, seconds
 
-_MARK_RADIUS_M = 0.3
 _PLAN_RETRY_S = 2.0
 _PLAN_TRIES = 4
-
-
-@dataclass
-class _Leg:
-    """What concerns the way to one stop only."""
-
-    replan_at: float  # [s] without progress
-    path: Path | None = None
-    distance_left: float = math.nan
-    begun: int | None = None
-    wait_until: int = 0
-    plan_again: int = 0
-    plan_tries: int = 0
-    blocked_s: float = 0.0
-    stuck: bool = False
+_LONGEST_STEP_S = 0.5
 
 
 class Mission:
@@ -53,6 +42,8 @@ class Mission:
         Follows the planned paths.
     home : Destination or None
         Where a mission with ``return_home`` ends.
+    surroundings : Surroundings or None
+        What the sensors find that is not on the map is planned round, when they are told of.
     """
 
     def __init__(
@@ -61,27 +52,27 @@ class Mission:
         planner: Planner,
         controller: Controller,
         home: Destination | None = None,
+        surroundings: Surroundings | None = None,
     ) -> None:
         self.config = config
         self.planner = planner
         self.controller = controller
         self.home = home
+        self._ways = WayFinder(planner, surroundings)
+        self._readings: Readings | None = None
         self._state = MissionState.IDLE
-        self._stops: tuple[Destination, ...] = ()
-        self._tour: tuple[Destination, ...] = ()  # the stops, and home
-        self._index = 0
-        self._reached: list[str] = []
-        self._missed: list[tuple[str, str]] = []
+        self._tour = Tour(())
+        self._paused = False
+        self._stay: HandOver | None = None
         self._events: list[str] = []
         self._message = ''
         self._last_stamp = 0
-        self._lost_since: int | None = None
-        self._aligning = False
+        self._lost = LostWatch()
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
         self._progress = ProgressWatch()
         self._look = LookAround(config.replan_after)
-        self._marks: list[tuple[int, Disc]] = []  # (until, where)
-        self._leg = _Leg(config.replan_after)
+        self._marks = Marks()
+        self._leg = Leg(config.replan_after)
 
     @property
     def is_busy(self) -> bool:
@@ -91,103 +82,197 @@ class Mission:
     def configure(self, config: MissionConfig, planner: Planner) -> None:
         """Use other settings from now on; a mission under way goes on."""
         self.config = config
-        self.planner = planner
+        self.planner = self._ways.planner = planner
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
 
     def start(self, stops: tuple[Destination, ...], return_home: bool = False) -> None:
-        """Take on a mission.
+        """Take on a mission; see `take` for what it raises."""
+        if not stops:
+            raise MissionError('a delivery needs at least one stop')
+        self.take(self.tour_of(stops, return_home))
+
+    def tour_of(self, stops: tuple[Destination, ...], return_home: bool) -> Tour:
+        """Return a tour of some stops, and home.
 
         Raises
         ------
         MissionError
-            One is under way, there is no stop, or there is no home to return to.
+            There is no home to return to.
+        """
+        if return_home and self.home is None:
+            raise MissionError('there is no home to return to')
+        return Tour(stops, self.home if return_home else None)
+
+    def take(self, tour: Tour) -> None:
+        """Take on a tour, from the stop that is next.
+
+        Raises
+        ------
+        MissionError
+            A mission is under way, or nothing is left of the tour.
         PlanningError
             The robot cannot stand at one of the stops; which and why.
         """
         if self.is_busy:
             raise MissionError('busy with another delivery: cancel it or wait until it is done')
-        if not stops:
-            raise MissionError('a delivery needs at least one stop')
-        if return_home and self.home is None:
-            raise MissionError('there is no home to return to')
-        for stop in stops:
-            if not (math.isfinite(stop.wait_s) and stop.wait_s >= 0.0):
-                raise MissionError(f'{stop.name}: the wait must be at least 0 s')
-            try:
-                self.planner.check_goal(stop.pose)
-            except PlanningError as error:
-                raise PlanningError(f'{stop.name}: {error}') from None
-        self._stops = stops
-        self._tour = (*stops, self.home) if return_home and self.home is not None else stops
-        self._index = 0
-        self._reached, self._missed, self._events = [], [], []
-        self._message = ''
-        self._lost_since, self._aligning, self._marks = None, False, []
-        self._leave_stop()
+        self.check(tour)
+        self._tour = tour
+        self._message, self._paused = '', False
+        self._lost.restart()
+        self._marks.clear()
+        self._begin_leg()
         self._state = MissionState.PLANNING
+
+    def check(self, tour: Tour) -> None:
+        """Look whether a tour can be taken on at all; see `take`."""
+        check_stops(tour, self.planner)
+
+    def hear(self, readings: Readings) -> None:
+        """Take what the ultrasonic sensors hear now; counts for the next step only."""
+        self.controller.hear(readings)
+        self._readings = readings
 
     def cancel(self, reason: str = 'cancelled') -> None:
         """End the mission; the stops that were not reached are missed for this reason."""
         if self.is_busy:
             self._end(MissionState.CANCELLED, reason)
 
+    def confirm(self) -> str:
+        """Take note that the hand-over is done; return where.
+
+        Raises
+        ------
+        MissionError
+            The robot stands at no stop that wants a confirmation.
+        """
+        stop = self._tour.goal
+        if self._stay is None or stop is None or not self._stay.wants_confirmation:
+            raise MissionError('nothing to confirm: the robot is not handing over')
+        self._stay.confirm()
+        self._events.append(f'{stop.name} confirmed')
+        return stop.name
+
+    def pause(self) -> None:
+        """Come to a stand and stay; no time limit runs meanwhile.
+
+        Raises
+        ------
+        MissionError
+            Nothing is under way, or it is paused already.
+        """
+        if not self.is_busy:
+            raise MissionError('nothing to pause: nothing is under way')
+        if self._paused:
+            raise MissionError('paused already')
+        self._paused = True
+        self._leg.path = None  # the robot may be moved meanwhile
+        self._events.append('paused')
+
+    def resume(self) -> None:
+        """Go on after a pause.
+
+        Raises
+        ------
+        MissionError
+            It is not paused.
+        """
+        if not self._paused:
+            raise MissionError('nothing to resume: not paused')
+        self._paused = False
+        self._progress.restart()
+        self._lost.restart()
+        if self._stay is None:
+            self._state = MissionState.PLANNING
+        self._events.append('resumed')
+
+    def skip(self, reason: str = 'skipped on request') -> str:
+        """Leave the stop that is next, or at which the robot stands, and go on; return its name.
+
+        Raises
+        ------
+        MissionError
+            Nothing is under way, or only the way home is left.
+        """
+        stop = self._tour.goal
+        if not self.is_busy or stop is None:
+            raise MissionError('nothing to skip: nothing is under way')
+        if self._tour.is_returning:
+            raise MissionError('nothing to skip: it is on its way home')
+        if self._stay is None:
+            self._miss(reason)
+        else:
+            self._leave()
+        return stop.name
+
     def step(self, situation: Situation) -> tuple[Velocity, MissionStatus]:
         """Return what to drive now and how the mission stands."""
-        dt = seconds(situation.stamp - self._last_stamp) if self._last_stamp else 0.0
-        dt = min(max(dt, 0.0), 0.5)
+        elapsed = seconds(situation.stamp - self._last_stamp) if self._last_stamp else 0.0
+        elapsed = max(elapsed, 0.0)
         self._last_stamp = situation.stamp
+        readings, self._readings = self._readings, None
+        if readings is not None and situation.pose is not None and not self._lost.is_lost:
+            self._ways.hear(readings, situation.pose, situation.stamp)
         velocity: Velocity | None = None
-        if self.is_busy:
-            velocity = self._advance(situation, dt)
+        if self.is_busy and not self._paused:
+            velocity = self._advance(situation, elapsed)
         if velocity is None:
-            velocity = self.controller.halt(dt)
+            velocity = self.controller.halt(min(elapsed, _LONGEST_STEP_S))
         status = self.status
         self._events = []
         return velocity, status
 
     @property
+    def tour(self) -> Tour:
+        """The stops, and what has become of them so far."""
+        return self._tour
+
+    @property
     def status(self) -> MissionStatus:
         """How the mission stands."""
-        stop = self._tour[self._index].name if self._index < len(self._tour) else ''
+        tour, goal = self._tour, self._tour.goal
         return MissionStatus(
-            self._state,
-            self._index,
-            stop,
+            MissionState.PAUSED if self._paused else self._state,
+            tour.index,
+            '' if goal is None else goal.name,
             self._leg.distance_left,
             self._leg.path if self.is_busy else None,
-            tuple(self._reached),
-            tuple(self._missed),
+            tour.reached,
+            tour.missed,
+            tour.unconfirmed,
             tuple(self._events),
             self._message,
         )
 
-    def _advance(self, situation: Situation, dt: float) -> Velocity | None:
+    def _advance(self, situation: Situation, elapsed: float) -> Velocity | None:
         """Do one step of a mission under way; None: stand still."""
-        stop = self._tour[self._index]
-        if self._state is MissionState.WAITING:
-            if situation.stamp >= self._leg.wait_until:
-                self._next()
+        dt = min(elapsed, _LONGEST_STEP_S)
+        stop, leg = self._tour.goal, self._leg
+        if self._stay is not None:
+            self._state = self._stay.state
+            if self._stay.step(elapsed):
+                self._leave()
             return None
         pose = situation.pose
         localised, velocity = self._localise(situation)
-        if not localised or pose is None:
+        leg.taken_s += elapsed if leg.begun else 0.0
+        if not localised or pose is None or stop is None:
             self._progress.restart()
             return velocity
-        if self._leg.begun is None:
-            self._leg.begun = situation.stamp
-        if seconds(situation.stamp - self._leg.begun) > self.config.stop_limit:
+        leg.begun = True
+        if leg.taken_s > self.config.stop_limit:
             self._miss(f'not reached within {self.config.stop_limit:.0f} s')
             return None
-        if self._leg.path is None and not self._plan(situation, pose, stop):
+        if leg.path is None and not self._plan(situation, pose, stop):
             return None
+        self._look_ahead(situation, pose, stop)
         drive = self.controller.step(pose, dt)
-        self._leg.distance_left = drive.distance_left
+        leg.distance_left = drive.distance_left
         if drive.arrived:
-            self._arrive(situation.stamp, stop)
+            self._arrive(stop)
             return None
         if drive.cross_track > self.config.off_path:
             self._events.append(f'{drive.cross_track:.1f} m off the path: planning anew')
-            self._leg.path = None
+            leg.path = None
             return None
         if situation.held:
             # Not blocked: nobody can be waited for or driven around. The time limit goes on.
@@ -196,37 +281,26 @@ class Mission:
         elif not self._watch(situation, pose, stop, drive, dt):
             return None
         elif self._state is MissionState.BLOCKED:
-            look = self._look.step(situation.stamp, situation.blocked and self._leg.stuck)
+            look = self._look.step(situation.stamp, situation.blocked and leg.stuck)
             return drive.velocity if look is None else look
         return drive.velocity
 
     def _localise(self, situation: Situation) -> tuple[bool, Velocity | None]:
         """Return whether the pose can be driven on, and what to drive if it cannot."""
-        config = self.config
-        known = (
-            situation.pose is not None
-            and situation.pose.is_finite
-            and seconds(situation.stamp - situation.pose_stamp) <= config.pose_timeout
-            and situation.position_std_m <= config.position_std_limit
-        )
-        heading = config.heading_std_found if self._aligning else config.heading_std_lost
-        if known and situation.heading_std_rad <= heading:
-            if self._lost_since is not None:
-                self._events.append('localised')
+        lost, config = self._lost, self.config
+        event = lost.look(situation, config)
+        if event:
+            self._events.append(event)
+        if not lost.is_lost:
+            if event:
                 self._leg.path = None
                 self._state = MissionState.PLANNING
-            self._lost_since, self._aligning = None, False
             return True, None
-        if self._lost_since is None:
-            self._lost_since = situation.stamp
-            self._events.append('not localised' if not known else 'heading not known')
-        lost_s = seconds(situation.stamp - self._lost_since)
-        if lost_s > config.localise_limit:
+        if lost.lost_s(situation.stamp) > config.localise_limit:
             self._end(MissionState.FAILED, f'not localised for {config.localise_limit:.0f} s')
             return False, None
-        self._aligning = known and lost_s >= config.align_after
-        self._state = MissionState.ALIGNING if self._aligning else MissionState.LOCALISING
-        if not self._aligning:
+        self._state = MissionState.ALIGNING if lost.aligning else MissionState.LOCALISING
+        if not lost.aligning:
             return False, None
         return False, self._align.step(situation.stamp, situation.blocked)
 
@@ -235,15 +309,12 @@ class Mission:
         self._state = MissionState.PLANNING
         if situation.stamp < self._leg.plan_again:
             return False
-        self._marks = [mark for mark in self._marks if mark[0] > situation.stamp]
-        discs = tuple(disc for _, disc in self._marks)
+        discs = self._marks.discs(situation.stamp)
         try:
-            path = self.planner.plan(
-                pose, stop.pose, keep_heading=stop.keep_heading, blocked=discs
-            )
+            path = self._ways.way(pose, stop, discs)
         except PlanningError as error:
-            if self._marks:
-                self._marks = []  # better wait before it than have no way at all
+            if discs:
+                self._marks.clear()  # better wait before it than have no way at all
                 return self._plan(situation, pose, stop)
             self._leg.plan_tries += 1
             if self._leg.plan_tries >= _PLAN_TRIES:
@@ -257,17 +328,33 @@ class Mission:
         self._events.append(f'{path.length:.1f} m to {stop.name}')
         return True
 
+    def _look_ahead(self, situation: Situation, pose: Pose2, stop: Destination) -> None:
+        """Take another way where something was found on this one."""
+        leg, discs = self._leg, self._marks.discs(situation.stamp)
+        if leg.path is None:
+            return
+        path = self._ways.other_way(
+            situation.stamp, pose, stop, leg.path, leg.distance_left, discs
+        )
+        if path is None:
+            return
+        self._events.append(f'something in the way: round it in {path.length:.1f} m')
+        leg.path, leg.distance_left = path, path.length
+        self.controller.follow(path)
+        if self._ways.has_moved(pose):
+            self._progress.restart()
+
     def _follow(self, path: Path) -> None:
         self._leg.path = path
         self._leg.distance_left = path.length
+        self._ways.begin()
         self.controller.follow(path)
         self._progress.restart()
         self._state = self._moving
 
     @property
     def _moving(self) -> MissionState:
-        home = self._index >= len(self._stops)
-        return MissionState.RETURNING if home else MissionState.DRIVING
+        return MissionState.RETURNING if self._tour.is_returning else MissionState.DRIVING
 
     def _watch(
         self, situation: Situation, pose: Pose2, stop: Destination, drive: Drive, dt: float
@@ -299,70 +386,62 @@ class Mission:
 
     def _around(self, situation: Situation, pose: Pose2, stop: Destination) -> None:
         """Look for a way around what is in the way; keep waiting before it if there is none."""
-        until = situation.stamp + nanoseconds(self.config.mark_time)
-        mark = (until, self._blocking(situation, pose))
-        kept = [old for old in self._marks if old[0] > situation.stamp]
+        mark = disc_ahead(situation, pose, self.planner.footprint_radius)
         try:
-            path = self.planner.plan(
-                pose,
-                stop.pose,
-                keep_heading=stop.keep_heading,
-                blocked=tuple(disc for _, disc in (*kept, mark)),
-            )
+            path = self._ways.way(pose, stop, (*self._marks.discs(situation.stamp), mark))
         except PlanningError as error:
             self._events.append(f'no way around ({error}): waiting')
             return
-        self._marks = [*kept, mark]
+        self._marks.add(mark, situation.stamp + nanoseconds(self.config.mark_time))
         self._follow(path)
         self._state = MissionState.BLOCKED
         self._events.append(f'a way around of {path.length:.1f} m')
 
-    def _blocking(self, situation: Situation, pose: Pose2) -> Disc:
-        """Return where the thing in the way is taken to stand, in map."""
-        reach = self.planner.footprint_radius + 0.1
-        x, y = situation.obstacle if situation.obstacle is not None else (reach, 0.0)
-        away = max(math.hypot(x, y), 1e-6)
-        # The echo comes from the near side; most of what stands in the way is as deep as the mark.
-        share = (max(away, reach) + _MARK_RADIUS_M) / away
-        centre = pose @ Pose2(x * share, y * share, 0.0)
-        return Disc(centre.x, centre.y, _MARK_RADIUS_M)
-
-    def _arrive(self, stamp: int, stop: Destination) -> None:
-        self._reached.append(stop.name)
+    def _arrive(self, stop: Destination) -> None:
+        self._tour = self._tour.arrive()
         self._events.append(f'reached {stop.name}')
         self._leg.distance_left = 0.0
-        if stop.wait_s > 0.0:
-            self._state = MissionState.WAITING
-            self._leg.wait_until = stamp + nanoseconds(stop.wait_s)
-        else:
-            self._next()
+        self._stay = HandOver(stop)
+        self._state = self._stay.state
+        if self._stay.step(0.0):
+            self._leave()
+
+    def _leave(self) -> None:
+        """Go on from the stop where the robot stands."""
+        stop, confirmed = self._tour.goal, True
+        if self._stay is not None and self._stay.wants_confirmation and stop is not None:
+            confirmed = False
+            self._events.append(f'{stop.name} not confirmed')
+        self._tour = self._tour.leave(confirmed)
+        self._next()
 
     def _miss(self, reason: str) -> None:
-        name = self._tour[self._index].name
-        self._missed.append((name, reason))
-        self._events.append(f'missed {name}: {reason}')
+        self._tour = self._tour.miss(reason)
+        self._events.append('missed {}: {}'.format(*self._tour.missed[-1]))
         self._next()
 
     def _next(self) -> None:
-        self._leave_stop()
-        self._index += 1
-        if self._index >= len(self._tour):
-            self._end(MissionState.FAILED if self._missed else MissionState.DONE, '')
+        self._begin_leg()
+        if self._tour.goal is None:
+            self._finish(MissionState.DONE if self._tour.is_success else MissionState.FAILED)
         else:
             self._state = MissionState.PLANNING
 
-    def _leave_stop(self) -> None:
+    def _begin_leg(self) -> None:
         """Forget what concerned one stop only."""
-        self._leg = _Leg(replan_at=self.config.replan_after)
+        self._leg = Leg(self.config.replan_after)
+        self._stay = None
         self._progress.restart()
 
     def _end(self, state: MissionState, reason: str) -> None:
-        waiting = self._state is MissionState.WAITING  # it stands where it was to go
-        first = self._index + (1 if waiting else 0)
-        self._missed.extend((stop.name, reason) for stop in self._tour[first:])
-        self._state = state
+        if self._stay is not None:  # it stands where it was to go
+            self._tour = self._tour.leave(not self._stay.wants_confirmation)
+            self._stay = None
+        self._tour = self._tour.abandon(reason)
+        self._finish(state)
+
+    def _finish(self, state: MissionState) -> None:
+        self._state, self._paused = state, False
         self._leg.path = None
-        done = f'{len(self._reached)} of {len(self._tour)} stops reached'
-        missed = '; '.join(f'{name}: {why}' for name, why in self._missed)
-        self._message = f'{done}; missed {missed}' if missed else done
+        self._message = self._tour.message
         self._events.append(f'{state.value}: {self._message}')

@@ -92,3 +92,6 @@ class MissionConfig(Config):
     off_path: float = parameter(
         0.5, description='Plan anew when farther from the path', unit='m', above=0.0, dynamic=True
     )
+    home_after_cancel: bool = parameter(
+        False, description='Whether the robot goes home after a cancelled delivery', dynamic=True
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,6 +27,7 @@ class Path:
     points: Vector
     heading: float | None = None
     arc: Vector = field(init=False)
+    _legs: list[tuple[float, float, float, float, float, float]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Drop repeated corners and measure the path."""
@@ -36,7 +38,10 @@ class Path:
         points = points[np.concatenate([[True], step > 1e-9])]
         step = np.linalg.norm(np.diff(points, axis=0), axis=1)
         object.__setattr__(self, 'points', points)
-        object.__setattr__(self, 'arc', np.concatenate([[0.0], np.cumsum(step)]))
+        arc = np.concatenate([[0.0], np.cumsum(step)])
+        object.__setattr__(self, 'arc', arc)
+        legs = np.column_stack([points[:-1], np.diff(points, axis=0), arc[:-1], np.diff(arc)])
+        object.__setattr__(self, '_legs', [tuple(leg) for leg in legs.tolist()])
 
     @property
     def length(self) -> float:
@@ -62,19 +67,27 @@ class Path:
         The window ``low <= arc <= high`` keeps a robot from jumping to another leg of a path that
         passes by itself.
         """
-        here = np.array([x, y])
-        if len(self.points) == 1:
-            return 0.0, float(np.linalg.norm(self.points[0] - here))
-        start, along = self.points[:-1], np.diff(self.points, axis=0)
-        length = np.diff(self.arc)
-        share = np.sum((here - start) * along, axis=1) / length**2
-        first = np.clip((low - self.arc[:-1]) / length, 0.0, 1.0)
-        last = np.clip((high - self.arc[:-1]) / length, 0.0, 1.0)
-        share = np.clip(share, first, last)
-        distance = np.linalg.norm(start + share[:, None] * along - here, axis=1)
-        outside = (self.arc[1:] < low - 1e-9) | (self.arc[:-1] > high + 1e-9)
-        best = int(np.argmin(np.where(outside, np.inf, distance)))
-        return float(self.arc[best] + share[best] * length[best]), float(distance[best])
+        best, best_arc = math.inf, 0.0
+        # In plain numbers: a path has few corners, and this is asked several times a step.
+        for x0, y0, along_x, along_y, begin, length in self._legs:
+            first, last = low - begin, high - begin
+            if length < first - 1e-9 or last < -1e-9:
+                continue
+            along = ((x - x0) * along_x + (y - y0) * along_y) / length
+            along = min(max(along, first, 0.0), max(min(last, length), 0.0), length)
+            share = along / length
+            away = math.hypot(x0 + share * along_x - x, y0 + share * along_y - y)
+            if away < best:
+                best, best_arc = away, begin + along
+        if best == math.inf:
+            return self._nearest_end(x, y, low)
+        return best_arc, best
+
+    def _nearest_end(self, x: float, y: float, low: float) -> tuple[float, float]:
+        """Return (arc, distance) of the start, or of the end where the window lies beyond it."""
+        index = 0 if len(self.points) == 1 or low <= 0.0 else -1
+        there = self.points[index]
+        return float(self.arc[index]), math.hypot(float(there[0]) - x, float(there[1]) - y)
 
     def resampled(self, spacing: float) -> Vector:
         """Return points at most `spacing` [m] apart along the path, corners kept, (m, 2)."""

@@ -51,6 +51,7 @@ def make_controller(
     limits: VelocityLimits,
     robot: RobotGeometry,
     settings: ControllerSettings | None = None,
+    frames: tuple[str, ...] = FRAMES,
 ) -> Controller:
     """Return a new path controller.
 
@@ -62,6 +63,8 @@ def make_controller(
     robot : RobotGeometry
         Its sensors and the distance between its wheels.
     settings : ControllerSettings, optional
+    frames : tuple of str
+        Of the five ultrasonic sensors, in the order of `SENSORS`.
 
     Raises
     ------
@@ -74,14 +77,14 @@ def make_controller(
     if name != 'fuzzy':
         raise ConfigError('controller', name, f'one of {", ".join(CONTROLLERS)}')
     mounts = sensor_mounts(robot)
-    missing = [frame for frame in FRAMES if frame not in mounts]
+    missing = [frame for frame in frames if frame not in mounts]
     if missing:
         raise ConfigError(
             'robot.ultrasonics', ', '.join(mounts) or 'none', f'{", ".join(missing)} for fuzzy'
         )
     return FuzzyController(
         limits,
-        tuple(mounts[frame] for frame in FRAMES),
+        tuple(mounts[frame] for frame in frames),
         robot.track,
         chosen.follower,
         chosen.detour,
@@ -89,3 +92,15 @@ def make_controller(
         chosen.reactive,
         chosen.contour,
     )
+
+
+def configure_controller(
+    controller: Controller, limits: VelocityLimits, settings: ControllerSettings
+) -> None:
+    """Let a controller use other limits and settings from now on, whatever it is doing.
+
+    What is not marked as dynamic stays as it was made.
+    """
+    controller.configure(settings.follower, limits)
+    if isinstance(controller, FuzzyController):
+        controller.tune(settings.track, settings.reactive)

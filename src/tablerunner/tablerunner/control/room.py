@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from tablerunner.control.destination import Destination
 from tablerunner.control.floor_map import FloorMap
+from tablerunner.control.fuzzy.readings import FRAMES
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.planner import Planner, PlannerConfig
+from tablerunner.control.surroundings import Surroundings, SurroundingsConfig
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import DriveLimits, RobotGeometry, Scenario
 
 
 def floor_map(scenario: Scenario, resolution: float = 0.05) -> FloorMap:
-    """Return the floor of a room; people are not on it."""
-    solids = tuple(outline.corners for outline in scenario.outlines if outline.is_solid)
-    return FloorMap.build(scenario.obstacle_segments(), solids, (), resolution)
+    """Return the floor of a room as its map has it; people are not on it."""
+    known = scenario.mapped
+    solids = tuple(outline.corners for outline in known.outlines if outline.is_solid)
+    return FloorMap.build(known.obstacle_segments(), solids, (), resolution)
 
 
 def make_planner(scenario: Scenario, config: PlannerConfig | None = None) -> Planner:
@@ -21,6 +24,16 @@ def make_planner(scenario: Scenario, config: PlannerConfig | None = None) -> Pla
     chosen = PlannerConfig() if config is None else config
     floor = floor_map(scenario, chosen.resolution)
     return Planner(floor, scenario.robot.footprint_radius, chosen)
+
+
+def make_surroundings(
+    scenario: Scenario, planner: Planner, config: SurroundingsConfig | None = None
+) -> Surroundings | None:
+    """Return an empty memory of what is not on the map; None without the five sensors."""
+    mounts = sensor_mounts(scenario.robot)
+    if any(frame not in mounts for frame in FRAMES):
+        return None
+    return Surroundings(planner.floor, tuple(mounts[frame] for frame in FRAMES), config)
 
 
 def limits_within(limits: VelocityLimits, base: DriveLimits) -> VelocityLimits:

@@ -314,7 +314,7 @@ class SafetyStop:
         if not np.isfinite(speeds[best]):
             return math.inf, math.inf, None, ''
         obstacle = (float(heard.points[best, 0]), float(heard.points[best, 1]))
-        return float(speeds[best]), float(ways[best]), obstacle, heard.sensors[best]
+        return float(speeds[best]), float(ways[best]), obstacle, str(heard.sensors[best])
 
     def _free_ways(self, points: Vector, wanted: Velocity) -> Vector:
         """Return how far the hull can go along the wanted arc before it meets each point [m].

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from tablerunner.config import Config, parameter
+from tablerunner.estimation.particles.config import ParticleConfig
 from tablerunner.odometry.motion import Motion, MotionNoise
 from tablerunner.types import (
     Estimate,
@@ -31,6 +32,7 @@ class Start:
     pose_covariance: Matrix  # (3, 3)
     range_biases: Vector | None = None  # (anchors,)
     covariance: Matrix | None = None  # (3 + anchors, 3 + anchors), pose then biases
+    anywhere: bool = False  # of a particle filter: nothing is known, the pose is the room's middle
 
 
 RANGE_SOURCE = 'uwb/ranges'
@@ -334,6 +336,9 @@ class EstimatorConfig(Config):
     )
     sun: SunConfig = parameter(factory=SunConfig, description='Of kf and ekf_cv')
     ddf: DdfConfig = parameter(factory=DdfConfig, description='Of ddf')
+    particles: ParticleConfig = parameter(
+        factory=ParticleConfig, description='Of pf, pf_ekf, pf_iekf and pf_uiekf'
+    )
 
 
 def no_use(

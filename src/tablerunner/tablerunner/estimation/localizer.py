@@ -14,7 +14,8 @@ from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
 from tablerunner.estimation.evidence import Evidence
 from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
-from tablerunner.estimation.registry import ESTIMATORS
+from tablerunner.estimation.particles.anywhere import anywhere, missing
+from tablerunner.estimation.registry import ESTIMATORS, STARTS_ANYWHERE
 from tablerunner.estimation.start_finder import StartFinder
 from tablerunner.estimation.status import Cause, LocalizerState, LocalizerStatus, tracking
 from tablerunner.estimation.timeline import Timeline
@@ -76,6 +77,7 @@ class Localizer:
         self._compass.reset()
         self._order = StampOrder()
         self._timeline: Timeline | None = None
+        self._open = False
         self._suspect: OdometrySample | None = None
         self._lost = False
         self._evidence = Evidence()
@@ -106,7 +108,7 @@ class Localizer:
             return
         if config.estimator != before.estimator:
             self._fixes.reset()
-            self._begin_again(self._timeline.newest)
+            self._begin_again()
         else:
             self._timeline.estimator = self._new_estimator()
 
@@ -119,8 +121,7 @@ class Localizer:
         self._health = UwbHealth(self.config.health, self.config.filter, anchors, self._lever_arm)
         self._anchor_ids = frozenset(anchor.anchor_id for anchor in anchors)
         self._forget_start()
-        if self._timeline is not None:
-            self._begin_again(self._timeline.newest)
+        self._begin_again()
 
     def switch(self, on: bool) -> None:
         """Switch fusion on or off; while it is off, odometry alone carries the pose."""
@@ -141,7 +142,7 @@ class Localizer:
     @property
     def status(self) -> LocalizerStatus:
         """State of the localiser and what to say about it."""
-        if self._timeline is not None:
+        if self._timeline is not None and not self._open:
             now, config = self._track.newest.stamp, self.config
             cause = self._health.cause(now)
             if not self._fusing:
@@ -155,9 +156,12 @@ class Localizer:
         if not len(self._track):
             return LocalizerStatus(LocalizerState.WAITING, 'no odometry yet')
         words = self._finder.words
+        if self._timeline is not None:
+            words = missing(self._timeline.newest, self.config.alignment)
         if self._lost:
             return LocalizerStatus(LocalizerState.LOST, f'lost; {words}')
-        state = LocalizerState.ALIGNING if self._finder.count else LocalizerState.WAITING
+        searching = self._timeline is not None or self._finder.count
+        state = LocalizerState.ALIGNING if searching else LocalizerState.WAITING
         return LocalizerStatus(state, words)
 
     @property
@@ -173,19 +177,19 @@ class Localizer:
     @property
     def estimate(self) -> Estimate | None:
         """Newest belief of the estimator; None before its start is known."""
-        return None if self._timeline is None else self._timeline.newest
+        return None if self._timeline is None or self._open else self._timeline.newest
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the states of `estimate`; empty before its start is known."""
-        return () if self._timeline is None else self._timeline.estimator.state_names
+        return () if self._timeline is None or self._open else self._timeline.estimator.state_names
 
     @property
     def map_to_odom(self) -> Pose2 | None:
         """Pose of odom in map at the newest estimate; None before the start is known."""
-        if self._timeline is None:
+        newest = self.estimate
+        if newest is None:
             return None
-        newest = self._timeline.newest
         return newest.pose @ self._track.pose(newest.stamp).inverse()
 
     def velocity(self) -> tuple[float, float]:
@@ -212,6 +216,7 @@ class Localizer:
             return _refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
         if self._timeline is not None:
             self._timeline.add_odometry(sample)
+            self._settle()
             return Outcome(self._timeline.newest)
         self._track.add(sample)
         self._track.trim(sample.stamp - nanoseconds(self.config.alignment.window))
@@ -220,6 +225,8 @@ class Localizer:
             pending, self._pending = self._pending, None
             self._begin(Start(sample.stamp, _vector(pending.pose), pending.covariance))
             return Outcome(self.estimate, (), restarted)
+        if self.config.estimator in STARTS_ANYWHERE and self._anchors:
+            self._begin(anywhere(self.config.filter, self._anchors, sample.stamp))
         return Outcome(None, (), restarted)
 
     def add_range(self, sample: RangeSample) -> Outcome:
@@ -230,7 +237,8 @@ class Localizer:
             self._health.hear(sample, False, self._track)
             return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
         if self._timeline is not None:
-            self._health.compare(sample, self._track, self._timeline)
+            if not self._open:
+                self._health.compare(sample, self._track, self._timeline)
             if self._timeline.estimator.takes_positions:
                 self._health.hear(sample, None, self._track)
                 return self._add_fix(sample)
@@ -281,7 +289,7 @@ class Localizer:
         innovation = self._timeline.add(heading)
         if innovation is None:
             return _refused(sample.stamp, heading.source, '', 'repeated')
-        return Outcome(self.estimate, (innovation,))
+        return self._corrected(innovation)
 
     def set_pose(self, sample: PoseSample) -> Outcome:
         """Begin anew at a pose that a user gives; it overrides whatever was believed."""
@@ -316,14 +324,33 @@ class Localizer:
         if withhold:
             innovation = innovation._replace(accepted=False, reason=Cause.DISAGREE.value)
         self._health.hear(sample, innovation.accepted, self._track)
-        return Outcome(self.estimate, (innovation,))
+        return self._corrected(innovation)
+
+    def _corrected(self, innovation: Innovation) -> Outcome:
+        self._settle()
+        newest = None if self._timeline is None else self._timeline.newest
+        return Outcome(newest, (innovation,))
+
+    def _settle(self) -> None:
+        """Believe the pose of particles that began anywhere, once it is well known."""
+        if self._timeline is None or not self._open:
+            return
+        if not missing(self._timeline.newest, self.config.alignment):
+            self._open = self._lost = False
+            self._starts += 1
+            self._health.begin(self._timeline.newest.stamp)
+            self._evidence = Evidence()
 
     def _switch_fault(self) -> str:
         return '' if self._fusing else Cause.SWITCHED_OFF.value
 
-    def _begin_again(self, estimate: Estimate) -> None:
-        """Begin a new estimate at the pose of this one."""
-        self._begin(Start(estimate.stamp, estimate.mean[:3], estimate.pose_covariance))
+    def _begin_again(self) -> None:
+        """Begin a new estimate at the pose that is known, or search it anew."""
+        estimate = self.estimate
+        if estimate is None:
+            self._timeline = None
+        else:
+            self._begin(Start(estimate.stamp, estimate.mean[:3], estimate.pose_covariance))
 
     def _begin(self, start: Start) -> None:
         self._timeline = Timeline(
@@ -331,7 +358,8 @@ class Localizer:
         )
         self._starts += 1
         self._health.begin(start.stamp)
-        self._lost = False
+        self._open = start.anywhere
+        self._lost = self._lost and self._open
         self._evidence = Evidence()
 
     def _place_fault(self, stamp: int) -> str:
@@ -372,7 +400,9 @@ class Localizer:
         self._track = OdometryTrack()
         self._track.add(sample)
         self._forget_start()
-        if estimate is not None:
+        if estimate is None:
+            self._timeline = None
+        else:
             stamp = max(estimate.stamp, sample.stamp)
             self._begin(Start(stamp, estimate.mean[:3], estimate.pose_covariance))
 

@@ -9,8 +9,15 @@ from tablerunner.estimation.dead_reckoning import DeadReckoning
 from tablerunner.estimation.ekf import Ekf
 from tablerunner.estimation.ekf_cv import EkfCv
 from tablerunner.estimation.estimator import Estimator, EstimatorConfig
+from tablerunner.estimation.iekf import Iekf, LmIekf
 from tablerunner.estimation.kf import Kf
 from tablerunner.estimation.models.range_model import Point3
+from tablerunner.estimation.particles.robot import (
+    ParticleEkf,
+    ParticleIekf,
+    ParticleUiekf,
+    RobotParticleFilter,
+)
 from tablerunner.estimation.ukf import Ukf
 from tablerunner.types import Anchor
 
@@ -37,4 +44,15 @@ ESTIMATORS: dict[str, EstimatorFactory] = {
     EkfCv.name: EkfCv,
     Ddf.name: Ddf,
     DeadReckoning.name: DeadReckoning,
+    Iekf.name: Iekf,
+    LmIekf.name: LmIekf,
+    RobotParticleFilter.name: RobotParticleFilter,
+    ParticleEkf.name: ParticleEkf,
+    ParticleIekf.name: ParticleIekf,
+    ParticleUiekf.name: ParticleUiekf,
 }
+
+STARTS_ANYWHERE = frozenset(
+    {RobotParticleFilter.name, ParticleEkf.name, ParticleIekf.name, ParticleUiekf.name}
+)
+"""Those that find their start by themselves."""

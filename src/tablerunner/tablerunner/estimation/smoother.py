@@ -23,7 +23,7 @@ from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion
 from tablerunner.types import Estimate, Matrix
 
-SMOOTHED = ('ekf', 'ukf', 'dead_reckoning')
+SMOOTHED = ('ekf', 'ukf', 'dead_reckoning', 'iekf', 'lm_iekf')
 """Estimators that can be smoothed: the others keep no covariance that F P F' + Q explains."""
 
 _HEADING = 2  # of every estimator: the only angle of a state

@@ -28,6 +28,7 @@ class Halt:
     x: float  # [m] in map
     y: float
     person: tuple[float, float] | None = None  # [m] where somebody stood near; None: nobody did
+    emergency: bool = False  # by an emergency stop
 
 
 def _no_stamps() -> Stamps:
@@ -151,6 +152,7 @@ def errors_table(trip: Trip) -> dict[str, Any]:
                 'x': item.x,
                 'y': item.y,
                 'for_a_person': item.person is not None,
+                'emergency': item.emergency,
             }
             for item in trip.halts
         ],

@@ -8,11 +8,13 @@ from types import MappingProxyType
 
 from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
+from tablerunner.experiments.camera_run import run_camera
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
 from tablerunner.experiments.lias import run_lias
 from tablerunner.experiments.liu2023 import run_liu2023
 from tablerunner.experiments.lv import run_lv
 from tablerunner.experiments.nlos import run_nlos
+from tablerunner.experiments.pf_uiekf import run_pf_uiekf
 from tablerunner.experiments.sun2019 import run_sun2019
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
@@ -20,11 +22,16 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'lv': run_lv,
         'bae2022': run_bae2022,
         'sun2019': run_sun2019,
+        'pf_uiekf': run_pf_uiekf,
         'liu2023': run_liu2023,
         'nlos': run_nlos,
+        'ceiling_camera': run_camera,
     }
 )
 
+USUAL_SEEDS = 20
+MORE_SEEDS: Mapping[str, int] = MappingProxyType({'pf_uiekf': 100})
+"""Where a seed is a short run, as many as the paper has."""
 
 RECORDED: Mapping[str, Callable[[Path, Progress], Outcome]] = MappingProxyType({'lias': run_lias})
 """Those that need recordings of others, from the folder that they are given."""

@@ -5,6 +5,8 @@ What the plane does not have (z, roll, pitch) gets zero variance: the robot stan
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -49,3 +51,15 @@ def twist_covariance_to_message(covariance: Matrix) -> Vector:
 def is_covariance(matrix: Matrix) -> bool:
     """Return whether a small matrix is finite with no negative variance."""
     return bool(np.isfinite(matrix).all()) and bool((matrix.diagonal() >= 0.0).all())
+
+
+def largest_deviations(covariance: Matrix) -> tuple[float, float]:
+    """Return the largest standard deviations of position [m] and of heading [rad].
+
+    `covariance` is of x, y, heading, shape (3, 3); that of the position lies along the long axis
+    of its ellipse.
+    """
+    mean = (covariance[0, 0] + covariance[1, 1]) / 2
+    half = (covariance[0, 0] - covariance[1, 1]) / 2
+    largest = mean + math.hypot(half, covariance[0, 1])
+    return math.sqrt(max(largest, 0.0)), math.sqrt(max(covariance[2, 2], 0.0))

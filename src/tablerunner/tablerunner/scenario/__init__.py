@@ -6,10 +6,17 @@ what cannot be.
 
 from tablerunner.scenario.anchor import AnchorPlace
 from tablerunner.scenario.box import Box
+from tablerunner.scenario.camera import Camera, Light
 from tablerunner.scenario.kitchen import Kitchen
 from tablerunner.scenario.outline import Outline
-from tablerunner.scenario.person import Person
-from tablerunner.scenario.robot import DriveLimits, RobotGeometry, UltrasonicMount
+from tablerunner.scenario.person import Person, PersonTag
+from tablerunner.scenario.robot import (
+    AnchorMount,
+    DriveLimits,
+    Marker,
+    RobotGeometry,
+    UltrasonicMount,
+)
 from tablerunner.scenario.scenario import Scenario, load_scenario
 from tablerunner.scenario.sensors import (
     ImuErrors,
@@ -23,14 +30,19 @@ from tablerunner.scenario.table import Table
 from tablerunner.scenario.wall import Wall
 
 __all__ = [
+    'AnchorMount',
     'AnchorPlace',
     'Box',
+    'Camera',
     'DriveLimits',
     'ImuErrors',
     'Kitchen',
+    'Light',
     'MagneticErrors',
+    'Marker',
     'Outline',
     'Person',
+    'PersonTag',
     'RobotGeometry',
     'Scenario',
     'SensorErrors',

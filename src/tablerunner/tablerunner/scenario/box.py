@@ -23,6 +23,9 @@ class Box(Config):
     magnetic_moment: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), description='magnetic dipole of its iron, in map axes', unit='A m^2'
     )
+    unmapped: bool = parameter(
+        False, description="true: it stands in the room, but the robot's map does not know it"
+    )
 
     @property
     def outline(self) -> Outline:

@@ -8,6 +8,20 @@ from dataclasses import dataclass
 from tablerunner.config.parameter import Config, parameter
 from tablerunner.errors import ConfigError
 
+_ARM_M = 0.6  # how far from the body a hand holds a tag
+
+
+@dataclass(frozen=True)
+class PersonTag(Config):
+    """A UWB tag that somebody wears; the anchors on the robot range with it."""
+
+    id: str = parameter(description='address of the tag')
+    position: tuple[float, float, float] = parameter(
+        (-0.25, 0.0, 1.0),
+        description='antenna ahead and left of the middle of the body, and over the floor',
+        unit='m',
+    )
+
 
 @dataclass(frozen=True)
 class Person(Config):
@@ -47,9 +61,19 @@ class Person(Config):
     patience: float = parameter(
         3.0, description='wait for a robot in the way before turning back', unit='s', low=0.0
     )
+    tag: PersonTag | None = parameter(None, description='UWB tag that the person wears')
 
     def check(self) -> None:
-        """Refuse a route without points or with the same point twice in a row."""
+        """Refuse a route without points or with a point twice in a row, a tag off the body."""
+        if self.tag is not None:
+            away = math.hypot(*self.tag.position[:2])
+            if not (away <= self.radius + _ARM_M and 0.0 <= self.tag.position[2] <= self.height):
+                raise ConfigError(
+                    'tag.position',
+                    list(self.tag.position),
+                    f'within {self.radius + _ARM_M:g} m of the middle of the body and '
+                    f'{self.height:g} m over the floor',
+                )
         if not self.route:
             raise ConfigError('route', [], 'at least one point')
         first = 0 if self.loop and len(self.route) > 1 else 1  # a loop joins last to first

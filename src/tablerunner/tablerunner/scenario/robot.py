@@ -30,6 +30,14 @@ class UltrasonicMount(Config):
         return Pose2(self.x, self.y, self.heading)
 
 
+@dataclass(frozen=True)
+class AnchorMount(Config):
+    """A UWB anchor on the robot, which ranges with tags that people carry."""
+
+    id: str = parameter(description='address that the anchor answers to')
+    position: tuple[float, float, float] = parameter(description='antenna in base_link', unit='m')
+
+
 def _five() -> tuple[UltrasonicMount, ...]:
     """Return the five sensors on the rim of the default footprint (Lv, fig. 4)."""
     places = (
@@ -72,6 +80,40 @@ class DriveLimits(Config):
 
 
 @dataclass(frozen=True)
+class Marker(Config):
+    """Two coloured discs on a dark plate, for the camera under the ceiling."""
+
+    colour: tuple[int, int, int] = parameter(
+        (235, 40, 140), description='red, green, blue of the discs', low=0, high=255
+    )
+    height: float = parameter(
+        1.15, description='of the plate over the floor', unit='m', low=0.0, high=10.0
+    )
+    disc_x: float = parameter(
+        -0.06, description='centre of the larger disc in base_link', unit='m'
+    )
+    disc_radius: float = parameter(
+        0.09, description='radius of the larger disc', unit='m', above=0.0
+    )
+    front_x: float = parameter(
+        0.14, description='centre of the smaller disc in base_link', unit='m'
+    )
+    front_radius: float = parameter(
+        0.055, description='radius of the smaller disc; 0: there is none', unit='m', low=0.0
+    )
+    plate_radius: float = parameter(
+        0.24, description='radius of the dark plate about base_link', unit='m', above=0.0
+    )
+
+    def check(self) -> None:
+        """Refuse discs that the plate does not hold."""
+        for name in ('disc', 'front'):
+            x, radius = getattr(self, f'{name}_x'), getattr(self, f'{name}_radius')
+            if radius > 0.0 and abs(x) + radius > self.plate_radius:
+                raise ConfigError(f'{name}_x', x, 'a disc on the plate (plate_radius) [m]')
+
+
+@dataclass(frozen=True)
 class RobotGeometry(Config):
     """A round robot on two driven wheels and a caster (Sun 2019, section 3)."""
 
@@ -95,6 +137,12 @@ class RobotGeometry(Config):
     )
     ultrasonics: tuple[UltrasonicMount, ...] = parameter(
         factory=_five, description='the ultrasonic sensors, in the order in which they fire'
+    )
+    anchors: tuple[AnchorMount, ...] = parameter(
+        (), description='UWB anchors on the robot, for the tags of people'
+    )
+    marker: Marker | None = parameter(
+        None, description='what the camera under the ceiling knows the robot by'
     )
     limits: DriveLimits = parameter(
         factory=DriveLimits, description='speeds and accelerations of the base'

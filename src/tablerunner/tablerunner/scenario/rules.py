@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tablerunner.scenario.scenario import Scenario
 
 _ROUTE_STEP_M = 0.05
+_ANCHOR_SPREAD_M = 0.05
 
 
 def check_scenario(scenario: Scenario) -> None:
@@ -29,7 +30,9 @@ def check_scenario(scenario: Scenario) -> None:
     _check_things(scenario)
     _check_stops(scenario)
     _check_people(scenario)
+    _check_tags(scenario)
     _check_routes(scenario)
+    _check_camera(scenario)
 
 
 def _once(field: str, names: Iterable[str], key: str) -> None:
@@ -141,6 +144,31 @@ def _check_people(scenario: Scenario) -> None:
             _check_clear(scenario, f'people[{index}].route[{where}]', way, person.radius, value)
 
 
+def _check_tags(scenario: Scenario) -> None:
+    """Refuse tags and anchors that answer to one name, and tags that no anchors can locate."""
+    taken = {scenario.tag_id: 'tag_id'}
+    taken.update({anchor.id: f'anchors[{i}].id' for i, anchor in enumerate(scenario.anchors)})
+    names = [(f'robot.anchors[{i}].id', item.id) for i, item in enumerate(scenario.robot.anchors)]
+    names += [
+        (f'people[{i}].tag.id', person.tag.id)
+        for i, person in enumerate(scenario.people)
+        if person.tag is not None
+    ]
+    for field, name in names:
+        if not name or name in taken:
+            other = f'another name than {taken[name]}' if name else 'a word'
+            raise ConfigError(field, name, other)
+        taken[name] = field
+    places = np.array([item.position[:2] for item in scenario.robot.anchors]).reshape(-1, 2)
+    worn = [i for i, person in enumerate(scenario.people) if person.tag is not None]
+    if worn and np.linalg.matrix_rank(places - places[:1], tol=_ANCHOR_SPREAD_M) < 2:
+        raise ConfigError(
+            'robot.anchors',
+            [list(item.position) for item in scenario.robot.anchors],
+            f'three anchors not in one line, to locate the tag of people[{worn[0]}]',
+        )
+
+
 def _check_routes(scenario: Scenario) -> None:
     for name, points in scenario.routes.items():
         if len(points) < 2:
@@ -149,4 +177,21 @@ def _check_routes(scenario: Scenario) -> None:
             radius = scenario.robot.footprint_radius
             _check_clear(
                 scenario, f'routes.{name}[{index}]', np.array([point]), radius, list(point)
+            )
+
+
+def _check_camera(scenario: Scenario) -> None:
+    """Refuse a camera that hangs outside the room, or below what it should see."""
+    if scenario.camera is None:
+        return
+    place = scenario.camera.position
+    if scenario.walls and not _inside_room(scenario, np.array([place[:2]])):
+        raise ConfigError('camera.position', list(place), 'a place inside the outer walls')
+    below = [(person.name, person.height) for person in scenario.people]
+    if scenario.robot.marker is not None:
+        below.append(("the robot's marker", scenario.robot.marker.height))
+    for name, height in below:
+        if height >= place[2]:
+            raise ConfigError(
+                'camera.position[2]', place[2], f'a height above {name} ({height:g} m) [m]'
             )

@@ -15,6 +15,7 @@ from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario.anchor import AnchorPlace
 from tablerunner.scenario.box import Box
+from tablerunner.scenario.camera import Camera
 from tablerunner.scenario.kitchen import Kitchen
 from tablerunner.scenario.outline import Outline
 from tablerunner.scenario.person import Person
@@ -47,6 +48,7 @@ class Scenario(Config):
     routes: dict[str, tuple[tuple[float, float], ...]] = parameter(
         factory=dict, description='named ways to drive, as points in map', unit='m'
     )
+    camera: Camera | None = parameter(None, description='camera under the ceiling')
     start: tuple[float, float, float] | None = parameter(
         None,
         description='x, y, heading of the robot at the start; the kitchen when not given',
@@ -94,6 +96,12 @@ class Scenario(Config):
             *(table.outline for table in self.tables),
             *(box.outline for box in self.boxes),
         )
+
+    @cached_property
+    def mapped(self) -> Scenario:
+        """The same room as the robot's map knows it: without boxes that are not on it."""
+        known = tuple(box for box in self.boxes if not box.unmapped)
+        return self if len(known) == len(self.boxes) else self.replace(boxes=known)
 
     def obstacle_segments(self) -> Array:
         """Return the edges of all that stands in the room, shape (n, 2, 2), in map [m]."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.special import ndtr
 
 from tablerunner.geometry.pose import Pose2
-from tablerunner.scenario import AnchorPlace, Scenario
+from tablerunner.scenario import Scenario, UwbErrors
 from tablerunner.simulation.clock import TICKS_PER_SECOND, DeviceClock, wrap_counter
 from tablerunner.simulation.sight import Sight, person_blocks
 from tablerunner.simulation.streams import stream
@@ -28,13 +28,23 @@ GAP_DB = {'': (3.0, 3.0), 'person': (7.5, 13.0), 'thing': (9.0, 17.0)}
 LOSS_DB = {'': 0.0, 'person': 5.0, 'thing': 8.0}
 
 
-class Radio:
-    """The tag's exchanges with all anchors in turn.
+class Links:
+    """What flies between one tag and some anchors, whoever carries which.
 
     The signal flies ``distance / c``; each of the three receptions is late by the link's bias
     (constant + in proportion to the distance), by the detour where something blocks the way, and
     by noise. The noise of each reception is such that the range of a symmetric exchange has
     standard deviation ``range_std`` (a range weighs the three receptions 1/4, 1/2, 1/4).
+
+    Parameters
+    ----------
+    errors : UwbErrors
+    tag_id : str
+    tag_clock : DeviceClock
+    clocks : mapping of str to DeviceClock
+        Of the anchors.
+    randoms : mapping of str to Generator
+        The random stream of the link to each anchor.
 
     Attributes
     ----------
@@ -44,82 +54,67 @@ class Radio:
         Exchanges lost so far, by anchor.
     """
 
-    def __init__(self, scenario: Scenario, seed: int) -> None:
-        self._errors = scenario.sensors.uwb
-        self._anchors = scenario.anchors
-        self._tag_id = scenario.tag_id
-        self._mount = scenario.robot.tag_position
-        self._heights = [person.height for person in scenario.people]
-        self._sight = Sight(scenario.outlines)
-        self._tag_clock = self._clock(stream(seed, f'clock {scenario.tag_id}'))
-        self._clocks = {
-            anchor.id: self._clock(stream(seed, f'clock {anchor.id}'))
-            for anchor in scenario.anchors
-        }
-        self._random = {anchor.id: stream(seed, f'uwb {anchor.id}') for anchor in scenario.anchors}
+    def __init__(
+        self,
+        errors: UwbErrors,
+        tag_id: str,
+        tag_clock: DeviceClock,
+        clocks: Mapping[str, DeviceClock],
+        randoms: Mapping[str, np.random.Generator],
+    ) -> None:
+        self._errors = errors
+        self._tag_id = tag_id
+        self._tag_clock = tag_clock
+        self._clocks = clocks
+        self._random = randoms
         self.bias_m: dict[str, float] = {}
         self.scale: dict[str, float] = {}
         for anchor_id, random in self._random.items():
             draws = random.standard_normal(2)
-            self.bias_m[anchor_id] = float(draws[0]) * self._errors.bias_std
-            self.scale[anchor_id] = float(draws[1]) * self._errors.scale_std
+            self.bias_m[anchor_id] = float(draws[0]) * errors.bias_std
+            self.scale[anchor_id] = float(draws[1]) * errors.scale_std
         # Where between least and most the detour lies: a Gauss-Markov process through its
         # distribution function, so that it is uniform at any time and changes slowly.
         self._detour = dict.fromkeys(self._random, 0.0)
         self._detour_ns: dict[str, int] = {}
         self.lost = dict.fromkeys(self._random, 0)
-        self._turn = 0
         self._sequence = 0
 
-    def _clock(self, random: np.random.Generator) -> DeviceClock:
-        return DeviceClock(self._errors.clock_error_ppm, self._errors.clock_walk_ppm, random)
-
-    def exchange(
-        self, stamp: int, pose: Pose2, people: Sequence[PersonState]
+    def fly(
+        self, stamp: int, anchor_id: str, distance: float, blocked: str
     ) -> tuple[ExchangeSample | None, RangeTruth]:
-        """Return the next exchange, None when it was lost, and the truth about it.
+        """Return the next exchange with an anchor, None when it was lost, and the truth about it.
 
         Parameters
         ----------
         stamp : int
-        pose : Pose2
-            base_link in map; the robot is taken to stand during the few milliseconds.
-        people : sequence of PersonState
+        anchor_id : str
+        distance : float
+            Between the antennas [m].
+        blocked : str
+            What stands in the way, as in `RangeTruth`.
         """
-        anchor = self._anchors[self._turn]
-        self._turn = (self._turn + 1) % len(self._anchors)
         self._sequence = (self._sequence + 1) % _SEQUENCES
-        antenna = pose @ Pose2(self._mount[0], self._mount[1])
-        tag = (antenna.x, antenna.y, self._mount[2])
-        distance = math.dist(tag, anchor.position)
-        blocked = ''
-        if self._sight.thing_blocks(tag, anchor.position):
-            blocked = 'thing'
-        elif person_blocks(tag, anchor.position, people, self._heights):
-            blocked = 'person'
-        return self._fly(stamp, anchor, distance, blocked)
-
-    def _fly(
-        self, stamp: int, anchor: AnchorPlace, distance: float, blocked: str
-    ) -> tuple[ExchangeSample | None, RangeTruth]:
-        errors, random = self._errors, self._random[anchor.id]
+        errors, random = self._errors, self._random[anchor_id]
         # Always the same draws, whatever happens, so that runs that differ in one thing compare.
         normal = random.standard_normal(6)
         uniform = random.random(3)
-        detour = self._next_detour(stamp, anchor.id, float(normal[5]))
+        detour = self._next_detour(stamp, anchor_id, float(normal[5]))
         excess = self._excess(blocked, detour)
         chance = errors.nlos_loss_probability if blocked else errors.loss_probability
         lost = bool(uniform[0] < chance)
-        truth = RangeTruth(stamp, anchor.id, self._sequence, distance, blocked, excess, lost)
-        clock = self._clocks[anchor.id]
+        truth = RangeTruth(
+            stamp, anchor_id, self._sequence, distance, blocked, excess, lost, self._tag_id
+        )
+        clock = self._clocks[anchor_id]
         clock.advance(stamp)
         self._tag_clock.advance(stamp)
         if lost:
-            self.lost[anchor.id] += 1
+            self.lost[anchor_id] += 1
             return None, truth
         extra = errors.nlos_std if blocked else 0.0
         std = math.hypot(errors.range_std, extra)
-        late = self.bias_m[anchor.id] + self.scale[anchor.id] * distance + excess
+        late = self.bias_m[anchor_id] + self.scale[anchor_id] * distance + excess
         noise = [float(draw) * std * math.sqrt(16.0 / 6.0) for draw in normal[:3]]
         flights = [(distance + late + part) / LIGHT_M_S for part in noise]
         low, high = errors.reply_delay
@@ -131,7 +126,7 @@ class Radio:
         gap = max(thin + (thick - thin) * detour + errors.power_std * float(normal[4]), 0.0)
         sample = ExchangeSample(
             stamp,
-            anchor.id,
+            anchor_id,
             self._tag_id,
             self._sequence,
             *times,
@@ -154,6 +149,76 @@ class Radio:
         errors = self._errors
         low, high = errors.person_excess if blocked == 'person' else errors.nlos_excess
         return low + (high - low) * detour
+
+
+class Radio:
+    """The exchanges of the robot's tag with all anchors of the room in turn.
+
+    Attributes
+    ----------
+    links : Links
+    """
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        errors = scenario.sensors.uwb
+        self._anchors = scenario.anchors
+        self._mount = scenario.robot.tag_position
+        self._heights = [person.height for person in scenario.people]
+        self._sight = Sight(scenario.outlines)
+        ids = [anchor.id for anchor in scenario.anchors]
+        self.links = Links(
+            errors,
+            scenario.tag_id,
+            device_clock(errors, scenario.tag_id, seed),
+            {name: device_clock(errors, name, seed) for name in ids},
+            {name: stream(seed, f'uwb {name}') for name in ids},
+        )
+        self._turn = 0
+
+    @property
+    def bias_m(self) -> dict[str, float]:
+        """Constant error of the link to each anchor [m]."""
+        return self.links.bias_m
+
+    @property
+    def scale(self) -> dict[str, float]:
+        """Error of the link to each anchor in proportion to the range."""
+        return self.links.scale
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Exchanges lost so far, by anchor."""
+        return self.links.lost
+
+    def exchange(
+        self, stamp: int, pose: Pose2, people: Sequence[PersonState]
+    ) -> tuple[ExchangeSample | None, RangeTruth]:
+        """Return the next exchange, None when it was lost, and the truth about it.
+
+        Parameters
+        ----------
+        stamp : int
+        pose : Pose2
+            base_link in map; the robot is taken to stand during the few milliseconds.
+        people : sequence of PersonState
+        """
+        anchor = self._anchors[self._turn]
+        self._turn = (self._turn + 1) % len(self._anchors)
+        antenna = pose @ Pose2(self._mount[0], self._mount[1])
+        tag = (antenna.x, antenna.y, self._mount[2])
+        distance = math.dist(tag, anchor.position)
+        blocked = ''
+        if self._sight.thing_blocks(tag, anchor.position):
+            blocked = 'thing'
+        elif person_blocks(tag, anchor.position, people, self._heights):
+            blocked = 'person'
+        return self.links.fly(stamp, anchor.id, distance, blocked)
+
+
+def device_clock(errors: UwbErrors, name: str, seed: int) -> DeviceClock:
+    """Return the clock of a device by its name."""
+    random = stream(seed, f'clock {name}')
+    return DeviceClock(errors.clock_error_ppm, errors.clock_walk_ppm, random)
 
 
 def _exchange_times(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from tablerunner.simulation.truth import PersonState
 Array = NDArray[np.float64]
 
 _NEAR_END_M = 0.05  # what an antenna is mounted on does not block it
+_SKIN_M = 0.1
 
 
 class Sight:
@@ -90,19 +92,45 @@ def person_blocks(
     heights: Sequence[float],
 ) -> bool:
     """Return whether the line from tag to anchor passes through a person, an upright cylinder."""
+    return any(
+        _way_inside(tag, anchor, person, height) > 0.0
+        for person, height in zip(people, heights, strict=True)
+    )
+
+
+def wearer_blocks(
+    tag: tuple[float, float, float],
+    anchor: tuple[float, float, float],
+    wearer: PersonState,
+    height: float,
+) -> bool:
+    """Return whether the body that wears a tag stands between it and an anchor.
+
+    The tag is on the skin of an upright cylinder, or in a hand: a line that cuts off less than
+    0.1 m of the body counts as free.
+    """
+    return _way_inside(tag, anchor, wearer, height) > _SKIN_M
+
+
+def _way_inside(
+    tag: tuple[float, float, float],
+    anchor: tuple[float, float, float],
+    person: PersonState,
+    height: float,
+) -> float:
+    """Return how far over the floor the line from tag to anchor runs inside a body [m]."""
     dx, dy, dz = anchor[0] - tag[0], anchor[1] - tag[1], anchor[2] - tag[2]
     flat2 = dx * dx + dy * dy
     if flat2 < 1e-12:
-        return False
-    for person, height in zip(people, heights, strict=True):
-        px, py = person.pose.x - tag[0], person.pose.y - tag[1]
-        middle = (px * dx + py * dy) / flat2
-        miss2 = (px - middle * dx) ** 2 + (py - middle * dy) ** 2
-        half2 = (person.radius_m**2 - miss2) / flat2
-        if half2 <= 0.0:
-            continue
-        half = half2**0.5
-        enter, leave = max(middle - half, 0.0), min(middle + half, 1.0)
-        if enter < leave and min(tag[2] + enter * dz, tag[2] + leave * dz) < height:
-            return True
-    return False
+        return 0.0
+    px, py = person.pose.x - tag[0], person.pose.y - tag[1]
+    middle = (px * dx + py * dy) / flat2
+    miss2 = (px - middle * dx) ** 2 + (py - middle * dy) ** 2
+    half2 = (person.radius_m**2 - miss2) / flat2
+    if half2 <= 0.0:
+        return 0.0
+    half = math.sqrt(half2)
+    enter, leave = max(middle - half, 0.0), min(middle + half, 1.0)
+    if enter >= leave or min(tag[2] + enter * dz, tag[2] + leave * dz) >= height:
+        return 0.0
+    return (leave - enter) * math.sqrt(flat2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import Scenario
 from tablerunner.simulation.bumper import Bumper
+from tablerunner.simulation.camera import CameraFeed
 from tablerunner.simulation.drive import Drive
 from tablerunner.simulation.encoders import Encoders
 from tablerunner.simulation.imu import Imu
@@ -14,10 +15,12 @@ from tablerunner.simulation.radio import Radio
 from tablerunner.simulation.schedule import Schedule
 from tablerunner.simulation.sonar import Sonar
 from tablerunner.simulation.streams import stream
+from tablerunner.simulation.tag_radio import TagRadio
 from tablerunner.simulation.truth import Contact, PersonState, RangeTruth, Truth
 from tablerunner.types import (
     NANOSECONDS,
     ExchangeSample,
+    ImageSample,
     ImuSample,
     MagneticSample,
     Refusal,
@@ -39,6 +42,7 @@ Sample = (
     | MagneticSample
     | ExchangeSample
     | UltrasonicSample
+    | ImageSample
     | Truth
     | RangeTruth
     | Contact
@@ -69,14 +73,17 @@ class Simulator:
         self.imu = Imu(robot, errors.imu, self.drive, stream(seed, 'imu'))
         self.magnetometer = Magnetometer(scenario, stream(seed, 'magnetometer'))
         self.radio = Radio(scenario, seed)
+        self.tags = TagRadio(scenario, seed)
         self.sonar = Sonar(scenario, stream(seed, 'sonar'))
         self.crowd = Crowd(scenario.people, seed)
         self.bumper = Bumper(scenario.outlines, robot.footprint_radius)
+        self.camera = CameraFeed(scenario, seed, START_NS) if scenario.camera else None
         self._wheels_due = Schedule(1.0 / errors.wheels.rate, START_NS)
         self._imu_due = Schedule(1.0 / errors.imu.rate, START_NS)
         self._magnetic_due = Schedule(1.0 / errors.magnetic.rate, START_NS)
         links = max(len(scenario.anchors), 1)
         self._uwb_due = Schedule(1.0 / (errors.uwb.rate * links), START_NS)
+        self._tags_due = Schedule(1.0 / (errors.uwb.rate * max(self.tags.count, 1)), START_NS)
         self._sonar_due = Schedule(errors.ultrasonic.slot, START_NS)
 
     @property
@@ -103,7 +110,8 @@ class Simulator:
         -------
         tuple
             What was measured at the new `now_ns`, in a fixed order: contacts and refused commands
-            first, then truth and wheels (together), IMU, magnetometer, UWB, ultrasonic.
+            first, then truth and wheels (together), IMU, magnetometer, UWB (the robot's tag, then
+            those that people wear), ultrasonic, camera.
         """
         samples: list[Sample] = []
         dt_s = seconds(STEP_NS)
@@ -124,10 +132,17 @@ class Simulator:
         if self._magnetic_due.is_due(now):
             samples.append(self.magnetometer.read(now, self.drive.pose))
         if self._uwb_due.is_due(now) and self.scenario.anchors:
-            exchange, range_truth = self.radio.exchange(now, self.drive.pose, self.people)
-            samples.append(range_truth)
-            if exchange is not None:
-                samples.append(exchange)
+            samples.extend(_told(*self.radio.exchange(now, self.drive.pose, self.people)))
+        if self.tags.count and self._tags_due.is_due(now):
+            samples.extend(_told(*self.tags.exchange(now, self.drive.pose, self.people)))
         if self._sonar_due.is_due(now) and self.scenario.robot.ultrasonics:
             samples.append(self.sonar.fire(now, self.drive.pose, self.people))
+        if self.camera is not None:
+            image = self.camera.step(self.truth, self.people)
+            if image is not None:
+                samples.append(image)
         return tuple(samples)
+
+
+def _told(exchange: ExchangeSample | None, truth: RangeTruth) -> tuple[Sample, ...]:
+    return (truth,) if exchange is None else (truth, exchange)

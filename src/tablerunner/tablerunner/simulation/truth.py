@@ -28,6 +28,7 @@ class RangeTruth:
     blocked_by: str  # '', 'thing' (wall, table, box) or 'person'
     excess_m: float  # detour of the signal behind what blocks it
     lost: bool
+    tag_id: str = ''
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,6 +31,19 @@ TOPICS = (
 )  # fmt: skip
 
 
+def emergency_message() -> object:
+    """Return what the safety stop says while an emergency stop holds."""
+    value = messages.make('diagnostic_msgs/msg/KeyValue', key='emergency', value='true')
+    return messages.make(
+        'diagnostic_msgs/msg/DiagnosticStatus',
+        level=2,
+        name='safety_stop',
+        message='emergency stop',
+        hardware_id='',
+        values=[value],
+    )
+
+
 def people_message(stamp: int, x: float) -> object:
     """Return where two people are, one of them far away."""
     poses = [messages.goal_message(Pose2(place, 1.0, 0.0), stamp, 'map').pose for place in (x, 50)]
@@ -40,13 +53,18 @@ def people_message(stamp: int, x: float) -> object:
 
 
 def write_bag(
-    path: Path, namespace: str = '', transforms: bool = True, crowd_x: float = 4.0
+    path: Path,
+    namespace: str = '',
+    transforms: bool = True,
+    crowd_x: float = 4.0,
+    emergency_s: float | None = None,
 ) -> None:
     """Write ten seconds of driving along x; the start is known after two, a halt is at five."""
     with BagWriter(path) as bag:
         for topic in TOPICS:
             bag.add_topic(f'{namespace}/{topic}', CONTRACT[topic].msgtype)
         bag.add_topic(f'{namespace}/people', 'geometry_msgs/msg/PoseArray')
+        bag.add_topic(f'{namespace}/safety_state', 'diagnostic_msgs/msg/DiagnosticStatus')
 
         def write(topic: str, stamp: int, message: object) -> None:
             bag.write(f'{namespace}/{topic}', stamp, message)
@@ -67,6 +85,8 @@ def write_bag(
             if transforms and time > 2.0:
                 place = [(stamp, 'map', 'odom', Pose2())]
                 write('tf', stamp, messages.transforms_message(place))
+            if time == emergency_s:
+                write('safety_state', stamp, emergency_message())
             held = 5.0 <= time < 6.5 or time == pytest.approx(8.0)
             write('cmd_vel_nav', stamp, messages.twist_message(Velocity(0.5, 0.0)))
             write('cmd_vel', stamp, messages.twist_message(Velocity(0.0 if held else 0.5, 0.3)))
@@ -125,6 +145,17 @@ def test_trip_of_bag_halt_with_nobody_near_is_for_a_thing(tmp_path: Path) -> Non
     write_bag(tmp_path / 'bag', crowd_x=20.0)
     (halt,) = read(tmp_path / 'bag').halts
     assert halt.person is None
+
+
+@pytest.mark.parametrize(('at_s', 'emergency'), [(5.5, True), (9.0, False)])
+def test_trip_of_bag_halt_of_an_emergency_is_told_apart(
+    tmp_path: Path, at_s: float, emergency: bool
+) -> None:
+    """Whoever stands near: it was not for them."""
+    write_bag(tmp_path / 'bag', emergency_s=at_s)
+    (halt,) = read(tmp_path / 'bag').halts
+    assert halt.emergency is emergency
+    assert (halt.person is None) is emergency
 
 
 def test_trip_of_bag_in_a_namespace(tmp_path: Path) -> None:

@@ -116,6 +116,8 @@ def test_all_estimators_stand_side_by_side(
         'ekf',
         'ukf',
         'dead_reckoning',
+        'iekf',
+        'lm_iekf',
     ]
     assert cli.main(['replay', str(bag), '--estimator', 'ukf', '--json', str(alone)]) == 0
     ukf = json.loads(alone.read_text())
@@ -127,7 +129,7 @@ def test_all_estimators_stand_side_by_side(
         assert line.split()[2:6] == [
             f'{item[name]:.3f}' for name in ('rmse', 'mean', 'max', 'final')
         ]
-    assert sum('smoothed' in line for line in lines) == 3
+    assert sum('smoothed' in line for line in lines) == 5
 
 
 def test_smoothed_path_ends_where_the_filter_ends_and_has_its_covariances(bag: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from tablerunner.config import Config, parameters_of
 from tablerunner.control import (
+    BatteryConfig,
     FollowerConfig,
     MissionConfig,
     PlannerConfig,
@@ -39,6 +40,7 @@ def expected_rows(cls: type[Config], prefix: str) -> list[str]:
         ('navigation.md', PlannerConfig, 'planner.'),
         ('navigation.md', FollowerConfig, 'follower.'),
         ('navigation.md', MissionConfig, 'mission.'),
+        ('navigation.md', BatteryConfig, 'battery.'),
     ],
 )
 def test_parameter_table_is_that_of_the_code(page: str, cls: type[Config], prefix: str) -> None:

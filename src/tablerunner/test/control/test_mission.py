@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -17,6 +18,7 @@ from tablerunner.control import (
     Planner,
     PurePursuit,
     Situation,
+    Tour,
     VelocityLimits,
 )
 from tablerunner.errors import MissionError, PlanningError
@@ -195,16 +197,7 @@ def test_mission_to_bad_pose_is_refused_by_name(pose: Pose2, words: str) -> None
 def test_cancel_in_each_state_stops_and_names_what_is_missed(state: MissionState) -> None:
     world = World()
     world.mission.start((TABLE,), return_home=True)
-    if state is MissionState.LOCALISING:
-        world.localised = False
-    elif state is MissionState.ALIGNING:
-        world.heading_std = 2.0
-    elif state is MissionState.HELD:
-        world.held = True
-    elif state is MissionState.BLOCKED:
-        world.person = Disc(3.5, 2.5, 0.3)
-    if state is not MissionState.PLANNING:
-        world.until(state)
+    prepare(world, state)
     world.mission.cancel()
     status = world.step()
     assert status.state is MissionState.CANCELLED
@@ -393,3 +386,179 @@ def test_mission_is_deterministic() -> None:
             velocities.append(world.velocity)
         runs.append(velocities)
     assert runs[0] == runs[1]
+
+
+CONFIRMED = Destination('table_1', Pose2(6.0, 4.0, 1.5), confirm_s=10.0)
+
+
+def test_hand_over_ends_when_somebody_confirms() -> None:
+    world = World()
+    world.mission.start((CONFIRMED, SECOND))
+    world.until(MissionState.HANDING_OVER)
+    for _ in range(40):
+        assert world.step().state is MissionState.HANDING_OVER
+        assert world.velocity == Velocity()
+    assert world.mission.confirm() == 'table_1'
+    status = world.run()
+    assert status.state is MissionState.DONE
+    assert status.unconfirmed == ()
+    assert world.states.count(MissionState.HANDING_OVER) == pytest.approx(41, abs=2)
+
+
+def test_hand_over_that_nobody_confirms_ends_in_time_and_is_told() -> None:
+    """The next stop is served all the same; the delivery as a whole is no success."""
+    world = World()
+    world.mission.start((CONFIRMED, SECOND))
+    status = world.run()
+    assert status.reached == ('table_1', 'table_2')
+    assert status.unconfirmed == ('table_1',)
+    assert status.missed == ()
+    assert status.state is MissionState.FAILED
+    assert status.message == '2 of 2 stops reached; not confirmed: table_1'
+    assert world.states.count(MissionState.HANDING_OVER) == pytest.approx(10.0 / DT, abs=3)
+
+
+def test_confirmation_does_not_shorten_the_wait() -> None:
+    """Who asks for two seconds at least gets them, however soon somebody confirms."""
+    world = World()
+    world.mission.start((dataclasses.replace(CONFIRMED, wait_s=2.0),))
+    world.until(MissionState.HANDING_OVER)
+    world.mission.confirm()
+    assert world.run().state is MissionState.DONE
+    assert world.states.count(MissionState.WAITING) == pytest.approx(2.0 / DT, abs=3)
+
+
+def test_confirmation_without_hand_over_is_refused() -> None:
+    world = World()
+    with pytest.raises(MissionError, match='nothing to confirm'):
+        world.mission.confirm()
+    world.mission.start((TABLE,))
+    world.until(MissionState.DRIVING)
+    with pytest.raises(MissionError, match='nothing to confirm'):
+        world.mission.confirm()
+    world.until(MissionState.WAITING)
+    with pytest.raises(MissionError, match='nothing to confirm'):
+        world.mission.confirm()
+
+
+def prepare(world: World, state: MissionState) -> None:
+    """Bring a mission into a state."""
+    if state is MissionState.LOCALISING:
+        world.localised = False
+    elif state is MissionState.ALIGNING:
+        world.heading_std = 2.0
+    elif state is MissionState.HELD:
+        world.held = True
+    elif state is MissionState.BLOCKED:
+        world.person = Disc(3.5, 2.5, 0.3)
+    if state is not MissionState.PLANNING:
+        world.until(state)
+
+
+UNDER_WAY = [state for state in MissionState if not (state.is_final or state.value == 'paused')]
+
+
+@pytest.mark.parametrize('state', UNDER_WAY)
+def test_pause_in_each_state_stands_and_resume_goes_on(state: MissionState) -> None:
+    """However long the pause: no time limit runs, and the tour is completed."""
+    world = World(config=MissionConfig(stop_limit=60.0, localise_limit=20.0))
+    stop = CONFIRMED if state is MissionState.HANDING_OVER else TABLE
+    world.mission.start((stop,), return_home=True)
+    prepare(world, state)
+    world.mission.pause()
+    with pytest.raises(MissionError, match='paused already'):
+        world.mission.pause()
+    for count in range(2400):
+        assert world.step().state is MissionState.PAUSED
+        assert count < 20 or world.velocity == Velocity()
+    world.localised, world.heading_std, world.held, world.person = True, 0.05, False, None
+    world.mission.resume()
+    with pytest.raises(MissionError, match='not paused'):
+        world.mission.resume()
+    if state is MissionState.HANDING_OVER:
+        world.mission.confirm()
+    status = world.run()
+    assert status.state is MissionState.DONE, world.events
+    assert status.reached == ('table_1', 'kitchen')
+
+
+@pytest.mark.parametrize('state', UNDER_WAY)
+def test_cancel_of_a_paused_mission_ends_it(state: MissionState) -> None:
+    world = World()
+    stop = CONFIRMED if state is MissionState.HANDING_OVER else TABLE
+    world.mission.start((stop,), return_home=True)
+    prepare(world, state)
+    world.mission.pause()
+    world.step()
+    world.mission.cancel()
+    status = world.step()
+    assert status.state is MissionState.CANCELLED
+    assert status.missed[-1] == ('kitchen', 'cancelled')
+    assert len(status.reached) + len(status.missed) == 2
+    assert status.unconfirmed == (('table_1',) if state is MissionState.HANDING_OVER else ())
+
+
+def test_robot_carried_away_in_a_pause_plans_anew() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    world.until(MissionState.DRIVING)
+    world.mission.pause()
+    world.step()
+    world.pose = Pose2(2.0, 5.0, 3.0)
+    world.mission.resume()
+    assert world.run().state is MissionState.DONE
+
+
+def test_pause_and_resume_of_nothing_are_refused() -> None:
+    world = World()
+    with pytest.raises(MissionError, match='nothing to pause'):
+        world.mission.pause()
+    with pytest.raises(MissionError, match='nothing to resume'):
+        world.mission.resume()
+
+
+@pytest.mark.parametrize('state', UNDER_WAY)
+def test_skip_in_each_state_goes_on_with_the_next_stop(state: MissionState) -> None:
+    world = World()
+    stop = CONFIRMED if state is MissionState.HANDING_OVER else TABLE
+    world.mission.start((stop, SECOND), return_home=True)
+    prepare(world, state)
+    if state is MissionState.RETURNING:
+        with pytest.raises(MissionError, match='on its way home'):
+            world.mission.skip()
+        return
+    assert world.mission.skip() == 'table_1'
+    world.localised, world.heading_std, world.held, world.person = True, 0.05, False, None
+    status = world.run()
+    assert status.reached[-2:] == ('table_2', 'kitchen')
+    stood = state in (MissionState.WAITING, MissionState.HANDING_OVER)
+    assert status.missed == (() if stood else (('table_1', 'skipped on request'),))
+    assert status.unconfirmed == (('table_1',) if state is MissionState.HANDING_OVER else ())
+
+
+def test_skip_of_the_last_stop_while_paused_ends_the_mission() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    world.until(MissionState.DRIVING)
+    world.mission.pause()
+    world.mission.skip()
+    assert world.step().state is MissionState.FAILED
+    with pytest.raises(MissionError, match='nothing to skip'):
+        world.mission.skip()
+
+
+def test_tour_is_taken_up_where_it_was_left() -> None:
+    """What became of the stops before stands in the result."""
+    world = World()
+    done = Tour((TABLE, SECOND), HOME, 1, missed=(('table_1', 'way blocked for 90 s'),))
+    world.mission.take(done)
+    status = world.run()
+    assert status.reached == ('table_2', 'kitchen')
+    assert status.missed == (('table_1', 'way blocked for 90 s'),)
+
+
+@pytest.mark.parametrize('confirm', [-1.0, math.nan, math.inf])
+def test_time_to_confirm_must_be_one(confirm: float) -> None:
+    world = World()
+    with pytest.raises(MissionError, match='x: the time to confirm'):
+        world.mission.start((Destination('x', Pose2(2.0, 2.0), confirm_s=confirm),))

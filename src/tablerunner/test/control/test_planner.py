@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tablerunner.control import Disc, FloorMap, Planner, PlannerConfig
+from tablerunner.control import Disc, FloorMap, Planner, PlannerConfig, make_planner
 from tablerunner.errors import ConfigError, PlanningError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.geometry.segments import distance_to_segments, polygon_edges, rectangle_corners
+from tablerunner.scenario import Box, Scenario, Wall
 
 RADIUS = 0.25
 WALLS = polygon_edges(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]))
@@ -160,3 +161,16 @@ def test_plan_that_cares_for_length_only_still_keeps_its_clearance() -> None:
     assert gap >= RADIUS + planner.config.clearance - 0.02
     # Up, over the end of the wall, and down.
     assert path.length < 2 * math.hypot(1.5 - 0.37, 3.37) + 1.5
+
+
+def test_plan_leads_through_what_the_map_does_not_know() -> None:
+    """A box that is not on the map is there for the sensors to find."""
+    wall = Wall(((0.0, 0.0), (6.0, 0.0), (6.0, 3.0), (0.0, 3.0)), 'hull', True)
+    box = Box('crate', 3.0, 1.5, 0.5, 0.5)
+    lengths = []
+    for unmapped in (False, True):
+        room = Scenario(name='room', walls=(wall,), boxes=(box.replace(unmapped=unmapped),))
+        path = make_planner(room).plan(Pose2(1.0, 1.5), Pose2(5.0, 1.5))
+        lengths.append(path.length)
+    assert lengths[0] > 4.2
+    assert lengths[1] == pytest.approx(4.0)

@@ -77,6 +77,7 @@ def test_errors_table_by_hand(tmp_path: Path) -> None:
             'x': 2.5,
             'y': 0.0,
             'for_a_person': True,
+            'emergency': False,
         },
         {
             'after': pytest.approx(8.0),
@@ -84,6 +85,7 @@ def test_errors_table_by_hand(tmp_path: Path) -> None:
             'x': 4.0,
             'y': 0.0,
             'for_a_person': False,
+            'emergency': False,
         },
     ]
     write_json(tmp_path / 'deep' / 'errors.json', table)

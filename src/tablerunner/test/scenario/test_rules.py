@@ -32,6 +32,10 @@ routes:
   tour: [[5.0, 5.0], [8.0, 5.0]]
 robot:
   wheel_radius: 0.06
+  marker: {height: 1.2}
+camera:
+  position: [5.0, 5.0, 3.0]
+  light: {level: 1.0}
 sensors:
   uwb: {range_std: 0.1}
 """
@@ -108,6 +112,30 @@ CASES = {
     'person without a way': ('[[5.0, 1.0], [5.0, 9.0]]', '[]', 'people[0].route', 'one point'),
     'route into a wall': ('[8.0, 5.0]]', '[9.9, 5.0]]', 'routes.tour[1]', 'clear of hull'),
     'route of one point': (', [8.0, 5.0]]', ']', 'routes.tour', 'at least two'),
+    'camera outside': (
+        '[5.0, 5.0, 3.0]',
+        '[-1.0, 5.0, 3.0]',
+        'camera.position',
+        'inside the outer',
+    ),
+    'camera among people': (
+        '5.0, 5.0, 3.0',
+        '5.0, 5.0, 1.6',
+        'camera.position[2]',
+        'above waiter',
+    ),
+    'lens that folds': (
+        '{level: 1.0}',
+        '{level: 1.0}\n  distortion: [-0.5, 0, 0, 0, 0]',
+        'camera.distortion',
+        'spreads rays',
+    ),
+    'disc off its plate': (
+        '{height: 1.2}',
+        '{front_x: 0.2}',
+        'robot.marker.front_x',
+        'on the plate',
+    ),
     'key twice': ('  wheel_radius: 0.06', '  track: 0.3\n  track: 0.3', 'robot.track', 'once'),
 }
 
@@ -128,6 +156,45 @@ def test_rules_refuse_naming_file_line_and_field(tmp_path: Path, what: str) -> N
     assert words in str(error)
 
 
+TAGGED = GOOD.replace(
+    'route: [[5.0, 1.0], [5.0, 9.0]]',
+    'route: [[5.0, 1.0], [5.0, 9.0]], tag: {id: w1, position: [-0.25, 0.0, 1.0]}',
+).replace(
+    'robot:',
+    'robot:\n  anchors:\n    - {id: R0, position: [0.2, 0.2, 1.0]}\n'
+    '    - {id: R1, position: [-0.2, 0.2, 1.0]}\n    - {id: R2, position: [0.0, -0.2, 1.0]}',
+)
+
+
+def test_rules_accept_a_person_with_a_tag(tmp_path: Path) -> None:
+    load_text(tmp_path, TAGGED)
+
+
+@pytest.mark.parametrize(
+    ('good', 'bad', 'field', 'words'),
+    [
+        ('id: w1', 'id: tag', 'people[0].tag.id', 'another name than tag_id'),
+        ('id: w1', 'id: R1', 'people[0].tag.id', 'another name than robot.anchors[1].id'),
+        ('id: R1', 'id: A0', 'robot.anchors[1].id', 'another name than anchors[0].id'),
+        ('id: R1', 'id: R0', 'robot.anchors[1].id', 'another name than robot.anchors[0].id'),
+        ('id: R1', "id: ''", 'robot.anchors[1].id', 'a word'),
+        ('[0.0, -0.2, 1.0]', '[0.4, 0.2, 1.0]', 'robot.anchors', 'not in one line'),
+        ('    - {id: R2, position: [0.0, -0.2, 1.0]}\n', '', 'robot.anchors', 'three anchors'),
+        ('[-0.25, 0.0, 1.0]', '[-1.25, 0.0, 1.0]', 'people[0].tag.position', 'within 0.85 m'),
+        ('[-0.25, 0.0, 1.0]', '[-0.25, 0.0, 1.9]', 'people[0].tag.position', '1.7 m over'),
+        ('[-0.25, 0.0, 1.0]', '[-0.25, 0.0, .nan]', 'people[0].tag.position[2]', 'finite'),
+    ],
+)
+def test_rules_refuse_tags_that_cannot_be(
+    tmp_path: Path, good: str, bad: str, field: str, words: str
+) -> None:
+    assert TAGGED.count(good) == 1
+    with pytest.raises(ConfigError) as caught:
+        load_text(tmp_path, TAGGED.replace(good, bad))
+    assert caught.value.field == field
+    assert words in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
@@ -145,3 +212,9 @@ def test_rules_refuse_a_file_that_is_no_scenario(tmp_path: Path, text: str, word
 def test_rules_refuse_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r'nowhere\.yaml.*a readable file'):
         load_scenario(tmp_path / 'nowhere.yaml')
+
+
+def test_rules_refuse_a_marker_as_high_as_the_camera(tmp_path: Path) -> None:
+    text = GOOD.replace('marker: {height: 1.2}', 'marker: {height: 3.0}')
+    with pytest.raises(ConfigError, match=r"camera\.position\[2\].*above the robot's marker"):
+        load_text(tmp_path, text)

@@ -13,7 +13,7 @@ from tablerunner.config import Document, build, to_mapping
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.geometry.segments import distance_to_segments
-from tablerunner.scenario import Scenario, SensorErrors, load_scenario
+from tablerunner.scenario import Box, Scenario, SensorErrors, load_scenario
 
 SCENARIOS = Path(__file__).parents[3] / 'tablerunner_bringup' / 'scenarios'
 
@@ -129,3 +129,14 @@ def test_ideal_sensors_keep_rates_and_lose_errors() -> None:
     assert ideal.wheels.motor_lag == SensorErrors().wheels.motor_lag
     assert ideal.uwb.range_std == ideal.uwb.bias_std == ideal.imu.gyro_bias_std == 0.0
     assert ideal.ultrasonic.missing_probability == 0.0
+
+
+def test_box_that_is_not_on_the_map_stands_in_the_room_only() -> None:
+    """Sensors, people and the hull meet it; what the robot plans on is without it."""
+    known, unknown = Box('pillar', 1.0, 1.0, 0.5, 0.5), Box('crate', 3.0, 1.0, 0.5, 0.5)
+    scenario = Scenario(name='room', boxes=(known, unknown.replace(unmapped=True)))
+    assert [outline.name for outline in scenario.outlines] == ['pillar', 'crate']
+    assert [outline.name for outline in scenario.mapped.outlines] == ['pillar']
+    assert len(scenario.mapped.obstacle_segments()) == 4
+    mapped = Scenario(name='room', boxes=(known,))
+    assert mapped.mapped is mapped

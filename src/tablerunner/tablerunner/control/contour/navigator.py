@@ -12,6 +12,7 @@ from tablerunner.control.contour.round_watch import RoundWatch
 from tablerunner.control.contour.wall_follower import LEFT, RIGHT, WallFollower
 from tablerunner.control.fuzzy.reactive import ReactiveController
 from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.fuzzy.trace import Trace
 from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Velocity
@@ -51,6 +52,8 @@ class NavigatorStep:
         Whether nothing was heard in the target direction.
     reason : str
         Why the target is unreachable, or contour following began; else empty.
+    traces : tuple of Trace
+        Of corner and speed on the approach, where asked for.
     """
 
     velocity: Velocity
@@ -59,6 +62,7 @@ class NavigatorStep:
     target_distance_m: float
     is_free: bool
     reason: str = ''
+    traces: tuple[Trace, ...] = ()
 
 
 class ContourNavigator:
@@ -73,6 +77,11 @@ class ContourNavigator:
         Its limits are kept here too. Accelerations are the caller's to limit.
     mounts : tuple of Pose2
         Poses of the five sensors in base_link, in the order of `SENSORS`.
+
+    Attributes
+    ----------
+    traced : bool
+        Whether steps are to tell which rules fired.
     """
 
     def __init__(
@@ -80,6 +89,7 @@ class ContourNavigator:
     ) -> None:
         self.config = config
         self.reactive = reactive
+        self.traced = False
         self._trail = EchoTrail(mounts, config.memory, config.look)
         self._wall = WallFollower(config, self._trail)
         self._round = RoundWatch(config.shortest_round)
@@ -157,7 +167,8 @@ class ContourNavigator:
         if abs(bearing) <= _SEEN_RAD:
             near = min(config.notice, away)
             blocking = self._trail.in_strip(pose, course, near, config.half_width)
-        velocity = self.reactive.step(readings, pose, target).velocity
+        decided = self.reactive.step(readings, pose, target, self.traced)
+        velocity = decided.velocity
         if velocity.linear_m_s > 0.0 and blocking is None:
             ahead = min(config.gap, away)
             blocking = self._trail.in_strip(pose, pose.heading, ahead, config.hull_width)
@@ -168,7 +179,7 @@ class ContourNavigator:
         velocity = Velocity(
             min(velocity.linear_m_s, config.approach_speed), velocity.angular_rad_s
         )
-        return NavigatorStep(velocity, Mode.APPROACH, 0, away, True)
+        return NavigatorStep(velocity, Mode.APPROACH, 0, away, True, '', decided.traces)
 
     def _along(
         self, readings: Readings, pose: Pose2, target: tuple[float, float], dt: float, away: float

@@ -12,12 +12,14 @@ from tablerunner.scenario import Scenario
 from tablerunner.types import Anchor, Matrix, Vector
 
 _MARGIN = 0.03
+_NOTE = {'fc': 'white', 'ec': 'none', 'alpha': 0.7, 'pad': 1.0}
 
 
 def draw_room(axes: Any, scenario: Scenario) -> None:
     """Draw everything that stands in the room."""
-    from matplotlib.patches import Polygon
+    from matplotlib.patches import Circle, Polygon
 
+    unmapped = {box.name for box in scenario.boxes if box.unmapped}
     for outline in scenario.outlines:
         if not outline.is_solid:
             corners = outline.corners
@@ -33,14 +35,29 @@ def draw_room(axes: Any, scenario: Scenario) -> None:
                 fc=style.TABLE_FACE if table else style.BOX_FACE,
                 ec=style.TABLE_EDGE if table else style.BOX_EDGE,
                 lw=0.9,
+                hatch='////' if outline.name in unmapped else None,
                 zorder=1.5,
             )
         )
         x, y = outline.corners.mean(axis=0)
         label = outline.name.removeprefix('table_') if table else ''
         axes.text(x, y, label, ha='center', va='center', color=style.TABLE_EDGE, zorder=1.6)
+        if outline.name in unmapped:
+            note = f'{outline.name}, not on the map'
+            axes.text(x, y, note, fontsize=7, ha='center', va='center', zorder=6.2, bbox=_NOTE)
     for person in scenario.people:
         route = np.array(person.route)
+        if len(route) == 1:  # stands there
+            body = Circle(person.route[0], person.radius, fc=style.HALT, ec='none', alpha=0.5)
+            axes.add_patch(body)
+            axes.annotate(
+                person.name,
+                person.route[0],
+                xytext=(10, 6),
+                textcoords='offset points',
+                fontsize=7,
+            )
+            continue
         if person.loop:
             route = np.vstack([route, route[:1]])
         axes.plot(*route.T, color='#C9C9C9', lw=0.9, ls=(0, (1, 2.5)), zorder=1.2)

@@ -175,7 +175,12 @@ def _draw_halts(axes: Any, trip: Trip) -> None:
     """Draw where the robot was stopped: larger where longer, filled where it was for a person."""
     for label, halts, face in (
         ('stopped for a person', [halt for halt in trip.halts if halt.person], style.HALT),
-        ('stopped for a thing', [halt for halt in trip.halts if not halt.person], 'white'),
+        (
+            'stopped for a thing',
+            [halt for halt in trip.halts if not (halt.person or halt.emergency)],
+            'white',
+        ),
+        ('emergency stop', [halt for halt in trip.halts if halt.emergency], style.EMERGENCY),
     ):
         if halts:
             axes.scatter(

@@ -1,0 +1,205 @@
+"""What the ultrasonic sensors have found on the floor that the map does not show.
+
+A grid of evidence (Moravec and Elfes, "High resolution maps from wide angle sonar", 1985) on the
+cells of the floor map: an echo speaks for something on the arc on which it may lie, and against
+anything in the cone before it. Echoes that the map explains are left out. What is not confirmed
+is forgotten, for most of what is not on the map walks away.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from tablerunner.config import Config, parameter
+from tablerunner.control.floor_map import FloorMap
+from tablerunner.control.fuzzy.readings import Readings
+from tablerunner.control.path import Path
+from tablerunner.geometry.pose import Pose2
+from tablerunner.types import seconds
+
+_FADE_EVERY_S = 1.0
+_ARC_M = 0.06  # half the thickness of the arc of an echo
+_BEFORE_M = 0.15  # so far before an echo nothing stands
+_SPACING_M = 0.1
+
+
+@dataclass(frozen=True)
+class SurroundingsConfig(Config):
+    """How what is found is weighed."""
+
+    reach: float = parameter(
+        1.5, description='What is heard farther away tells nothing of a place', unit='m', above=0.0
+    )
+    sharp: float = parameter(
+        0.8,
+        description='Up to here an echo counts whole; farther away its arc is wide',
+        unit='m',
+        above=0.0,
+    )
+    explained: float = parameter(
+        0.15,
+        description='An echo is of the map when something on it is so near the arc',
+        unit='m',
+        low=0.0,
+    )
+    passed: float = parameter(
+        0.35, description='What speaks against a place that sound has passed', low=0.0
+    )
+    silent: float = parameter(
+        0.2,
+        description='The same where nothing echoed: sound may have been mirrored away',
+        low=0.0,
+    )
+    enough: float = parameter(
+        1.5, description='Whole echoes that make something of a place', above=0.0
+    )
+    most: float = parameter(3.0, description='No more echoes than these are remembered', above=0.0)
+    fade_time: float = parameter(
+        30.0, description='Time constant of forgetting', unit='s', above=0.0
+    )
+    opening: float = parameter(
+        0.48, description='Full opening of the cones', unit='rad', above=0.0, high=3.0
+    )
+
+
+class Surroundings:
+    """Evidence for things that are not on the map; deterministic.
+
+    Parameters
+    ----------
+    floor : FloorMap
+        What is on the map.
+    mounts : tuple of Pose2
+        Poses of the sensors in base_link, in the order of the readings.
+    config : SurroundingsConfig, optional
+    """
+
+    def __init__(
+        self,
+        floor: FloorMap,
+        mounts: tuple[Pose2, ...],
+        config: SurroundingsConfig | None = None,
+    ) -> None:
+        self.config = config or SurroundingsConfig()
+        self._map = floor
+        self._mounts = mounts
+        self._half_tangent = math.tan(self.config.opening / 2.0)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._evidence = np.zeros(self._map.shape)
+        self._ages = [math.inf] * len(self._mounts)
+        self._last: int | None = None
+        self._fade_s = 0.0
+        self._floor: FloorMap | None = self._map  # None: to be made anew
+
+    def hear(self, readings: Readings, pose: Pose2, stamp: int) -> None:
+        """Take what is new in `readings`; `pose` is base_link in map at `stamp` [ns]."""
+        dt = 0.0 if self._last is None else max(seconds(stamp - self._last), 0.0)
+        self._last = stamp
+        self._fade(dt)
+        for sensor, (distance, age) in enumerate(
+            zip(readings.distances_m, readings.ages_s, strict=True)
+        ):
+            # The same reading has grown older by dt; a new one is younger than that.
+            is_new = age < self._ages[sensor] + 0.5 * dt
+            self._ages[sensor] = age
+            if is_new and age < 0.5 and not math.isnan(distance):
+                self._add(distance, pose @ self._mounts[sensor])
+
+    def _fade(self, dt: float) -> None:
+        self._fade_s += dt
+        if self._fade_s < _FADE_EVERY_S:
+            return
+        self._evidence *= math.exp(-self._fade_s / self.config.fade_time)
+        self._fade_s = 0.0
+        self._floor = None
+
+    def _add(self, distance: float, at: Pose2) -> None:
+        """Weigh one reading; `at` is the sensor in map."""
+        config, floor = self.config, self._map
+        far = min(distance, config.reach)
+        row, column = floor.cell(at.x, at.y)
+        half = math.ceil((far + _ARC_M) / floor.resolution)
+        rows = slice(max(row - half, 0), max(row + half + 1, 0))
+        columns = slice(max(column - half, 0), max(column + half + 1, 0))
+        evidence = self._evidence[rows, columns]
+        if not evidence.size:
+            return
+        xs = floor.origin[0] + floor.resolution * np.arange(
+            columns.start, columns.start + evidence.shape[1]
+        )
+        ys = floor.origin[1] + floor.resolution * np.arange(
+            rows.start, rows.start + evidence.shape[0]
+        )
+        dx, dy = xs[None, :] - at.x, ys[:, None] - at.y
+        cos, sin = math.cos(at.heading), math.sin(at.heading)
+        along = dx * cos + dy * sin
+        aside = np.abs(dy * cos - dx * sin) / np.maximum(along * self._half_tangent, 1e-9)
+        in_cone = (aside <= 1.0) & (along > 0.0)
+        away = np.hypot(dx, dy)
+        against = config.silent if distance == math.inf else config.passed
+        before = in_cone & (away < far - _BEFORE_M)
+        evidence[before] = np.maximum(evidence[before] - against, 0.0)
+        self._floor = None
+        if distance > config.reach:
+            return
+        arc = in_cone & (np.abs(away - distance) <= _ARC_M)
+        known = floor.distance[rows, columns][arc]
+        if not known.size or float(known.min()) <= config.explained:
+            return
+        # Sound is strongest in the middle of the cone.
+        weight = min(1.0, config.sharp / max(distance, 1e-6)) * (1.0 - aside[arc] ** 2)
+        evidence[arc] = np.minimum(evidence[arc] + weight, config.most)
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """Which cells of the floor hold something that the map does not show."""
+        return np.asarray(self._evidence >= self.config.enough)
+
+    @property
+    def floor(self) -> FloorMap:
+        """The floor with what was found on it."""
+        if self._floor is None:
+            found, floor = self.found, self._map
+            self._floor = floor
+            if found.any():
+                away = ndimage.distance_transform_edt(~found, sampling=floor.resolution)
+                self._floor = FloorMap(
+                    floor.origin,
+                    floor.resolution,
+                    np.minimum(floor.distance, away),
+                    floor.outside,
+                )
+        return self._floor
+
+    def is_in_the_way(self, path: Path, begin: float, length: float, radius: float) -> bool:
+        """Return whether something that was found lies on a part of a path.
+
+        Parameters
+        ----------
+        path : Path
+        begin, length : float
+            The part, as length along the path [m].
+        radius : float
+            Of what is to pass there [m].
+        """
+        cells = np.argwhere(self.found)
+        if not len(cells):
+            return False
+        places = self._map.origin + self._map.resolution * cells[:, ::-1]
+        end = min(begin + length, path.length)
+        arcs = np.linspace(begin, end, max(2, math.ceil((end - begin) / _SPACING_M) + 1))
+        points = np.column_stack([np.interp(arcs, path.arc, path.points[:, k]) for k in (0, 1)])
+        low, high = points.min(axis=0) - radius, points.max(axis=0) + radius
+        places = places[np.all((places >= low) & (places <= high), axis=1)]
+        if not len(places):
+            return False
+        away2 = np.sum((points[:, None, :] - places[None]) ** 2, axis=-1)
+        return bool(away2.min() < radius**2)

@@ -1,0 +1,1 @@
+"""Particle filters and what they are made of; everything is vectorised over the particles."""

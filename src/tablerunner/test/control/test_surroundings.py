@@ -1,0 +1,132 @@
+"""What the sensors find beside the map: where it is, and when it is forgotten."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tablerunner.control import Surroundings, SurroundingsConfig, make_planner, make_surroundings
+from tablerunner.control.fuzzy import UltrasonicRing
+from tablerunner.control.path import Path
+from tablerunner.geometry.pose import Pose2
+from tablerunner.scenario import Box, Scenario, Wall
+from tablerunner.simulation.sonar import Sonar
+from tablerunner.types import NANOSECONDS, nanoseconds
+
+CORNERS = ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0))
+CHAIR = Box('chair', 3.0, 2.0, 0.45, 0.45)
+PATH = Path(np.array([[1.0, 2.0], [5.0, 2.0]]))
+
+
+def room(*boxes: Box) -> Scenario:
+    outer = Wall(CORNERS, 'outer wall', closed=True)
+    return Scenario('small', walls=(outer,), boxes=boxes, start=(1.0, 2.0, 0.0))
+
+
+class Listener:
+    """Hears a room with its sensors, knowing only the map of another."""
+
+    def __init__(self, there: Scenario, known: Scenario, seed: int) -> None:
+        found = make_surroundings(known, make_planner(known))
+        assert found is not None
+        self.found: Surroundings = found
+        self.there = there
+        self.sonar = Sonar(there, np.random.default_rng(seed))
+        self.ring = UltrasonicRing()
+        self.stamp = NANOSECONDS
+
+    def turn_to(self, there: Scenario) -> None:
+        """Let the room be another one from now on."""
+        self.sonar = Sonar(there, np.random.default_rng(99))
+
+    def stand(self, pose: Pose2, seconds: float) -> None:
+        """Hear for a while from one pose, firing every 30 ms as the simulator does."""
+        for _ in range(round(seconds / 0.03)):
+            self.stamp += nanoseconds(0.03)
+            self.ring.add(self.sonar.fire(self.stamp, pose, ()), self.stamp)
+            self.found.hear(self.ring.readings(self.stamp), pose, self.stamp)
+
+    def places(self) -> np.ndarray:
+        """Return where something was found, shape (n, 2)."""
+        floor, cells = self.found._map, np.argwhere(self.found.found)
+        return floor.origin + floor.resolution * cells[:, ::-1]
+
+
+@pytest.mark.parametrize('seed', range(5))
+@pytest.mark.parametrize('gap', [0.3, 0.6, 1.0])
+def test_face_of_a_chair_is_found_where_it_is(gap: float, seed: int) -> None:
+    listener = Listener(room(CHAIR), room(), seed)
+    listener.stand(Pose2(3.0 - 0.225 - 0.22 - gap, 2.0, 0.0), 2.0)
+    places = listener.places()
+    assert len(places)
+    assert abs(np.mean(places[:, 0]) - 2.775) < 0.08  # noise, cells, thickness of the arc
+    assert abs(np.mean(places[:, 1]) - 2.0) < 0.08
+    assert np.max(np.abs(places[:, 1] - 2.0)) < 0.05 + 0.24 * gap  # within the cone
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_what_is_on_the_map_is_not_found(seed: int) -> None:
+    """Also with a pose that is 0.1 m and 3 degrees off."""
+    listener = Listener(room(CHAIR), room(CHAIR), seed)
+    for x, y, heading in ((2.0, 2.0, 0.0), (0.6, 0.6, 0.4), (3.0, 1.2, 1.5), (5.0, 3.2, 2.0)):
+        listener.stand(Pose2(x, y, heading), 1.0)
+    assert not len(listener.places())
+    assert listener.found.floor is listener.found._map
+
+
+def test_what_has_gone_is_forgotten_when_a_sensor_looks_there() -> None:
+    listener = Listener(room(CHAIR), room(), 1)
+    at = Pose2(2.0, 2.0, 0.0)
+    listener.stand(at, 2.0)
+    assert len(listener.places())
+    listener.turn_to(room())
+    listener.stand(at, 0.3)
+    assert len(listener.places())  # one silence proves nothing
+    listener.stand(at, 3.0)
+    assert not len(listener.places())
+
+
+def test_what_is_not_looked_at_fades() -> None:
+    config = SurroundingsConfig()
+    longest = config.fade_time * math.log(config.most / config.enough)  # at most: see `most`
+    listener = Listener(room(CHAIR), room(), 1)
+    listener.stand(Pose2(2.0, 2.0, 0.0), 2.0)
+    listener.turn_to(room())
+    away = Pose2(1.0, 2.0, math.pi)
+    listener.stand(away, 3.0)
+    assert len(listener.places())
+    listener.stand(away, longest)
+    assert not len(listener.places())
+
+
+def test_floor_and_path_show_what_was_found() -> None:
+    listener = Listener(room(CHAIR), room(), 1)
+    assert not listener.found.is_in_the_way(PATH, 0.0, 4.0, 0.28)
+    listener.stand(Pose2(2.0, 2.0, 0.0), 2.0)
+    floor = listener.found.floor
+    assert floor.distance_at(np.array([2.78, 2.0])) < 0.06
+    assert floor.distance_at(np.array([2.28, 2.0])) == pytest.approx(0.5, abs=0.1)
+    assert listener.found.is_in_the_way(PATH, 0.0, 4.0, 0.28)
+    assert listener.found.is_in_the_way(PATH, 1.0, 1.0, 0.28)
+    assert not listener.found.is_in_the_way(PATH, 0.0, 1.2, 0.28)  # ends 0.5 m before it
+    assert not listener.found.is_in_the_way(PATH, 2.5, 1.5, 0.28)
+    beside = Path(np.array([[1.0, 3.0], [5.0, 3.0]]))
+    assert not listener.found.is_in_the_way(beside, 0.0, 4.0, 0.28)
+    listener.found.reset()
+    assert not len(listener.places())
+
+
+def test_single_false_echo_is_not_believed() -> None:
+    listener = Listener(room(), room(), 1)
+    at = Pose2(2.0, 2.0, 0.0)
+    listener.stand(at, 1.0)
+    sample = Sonar(room(CHAIR), np.random.default_rng(3))
+    for _ in range(3):  # the third sensor looks ahead
+        heard = sample.fire(listener.stamp, at, ())
+    listener.stamp += nanoseconds(0.03)
+    listener.ring.add(heard.__class__(listener.stamp, heard.sensor, 0.55, 0.03, 3.0, 0.48), 10**12)
+    listener.found.hear(listener.ring.readings(listener.stamp), at, listener.stamp)
+    assert listener.found._evidence.max() > 0.5
+    assert not len(listener.places())

@@ -1,0 +1,110 @@
+"""Ways round what was found, and how long to wait for them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tablerunner.control import Destination, Surroundings, make_planner
+from tablerunner.control.path import Path
+from tablerunner.control.way_finder import WayFinder
+from tablerunner.errors import PlanningError
+from tablerunner.geometry.pose import Pose2
+from tablerunner.scenario import Scenario, Wall
+from tablerunner.types import NANOSECONDS, nanoseconds
+
+OUTER = Wall(((0.0, 0.0), (8.0, 0.0), (8.0, 5.0), (0.0, 5.0)), 'outer', closed=True)
+START, GOAL = Pose2(1.0, 1.0, 0.0), Destination('goal', Pose2(7.0, 1.0, 0.0))
+NOW = 10 * NANOSECONDS
+
+
+class Found(Surroundings):
+    """Surroundings with things put where a test wants them."""
+
+    def put(self, x: float, low: float, high: float) -> None:
+        """Put a wall of found cells at x from y = low to high."""
+        for y in np.arange(low, high, 0.05):
+            self._evidence[self._map.cell(x, float(y))] = 9.0
+        self._floor = None
+
+
+def make(*walls: Wall) -> tuple[WayFinder, Found]:
+    planner = make_planner(Scenario('room', walls=(OUTER, *walls), start=(1.0, 1.0, 0.0)))
+    found = Found(planner.floor, ())
+    return WayFinder(planner, found), found
+
+
+def test_way_leads_round_what_was_found_and_through_it_only_if_need_be() -> None:
+    finder, found = make()
+    straight = finder.way(START, GOAL, ())
+    assert straight.length == pytest.approx(6.0, abs=0.05)
+    found.put(4.0, 0.0, 2.0)
+    round_it = finder.way(START, GOAL, ())
+    assert round_it.length > 6.3
+    assert min(point[1] for point in round_it.points if abs(point[0] - 4.0) < 0.2) > 2.3
+    found.put(4.0, 0.0, 5.0)
+    assert finder.way(START, GOAL, ()).length == pytest.approx(6.0, abs=0.05)
+    wall = Wall(((4.0, 0.0), (4.0, 5.0)), 'wall')
+    closed, _ = make(wall)
+    with pytest.raises(PlanningError, match='no way'):
+        closed.way(START, GOAL, ())
+
+
+def test_short_other_way_is_taken_at_once() -> None:
+    finder, found = make()
+    path = finder.way(START, GOAL, ())
+    assert finder.other_way(NOW, START, GOAL, path, path.length, ()) is None
+    found.put(2.5, 0.6, 1.4)
+    soon = NOW + nanoseconds(0.1)
+    assert finder.other_way(soon, START, GOAL, path, path.length, ()) is None  # looks 4 times a s
+    other = finder.other_way(NOW + nanoseconds(0.3), START, GOAL, path, path.length, ())
+    assert other is not None
+    assert not found.is_in_the_way(other, 0.0, other.length, 0.28)
+
+
+def test_long_other_way_is_taken_only_when_the_thing_stays() -> None:
+    finder, found = make()
+    path = finder.way(START, GOAL, ())
+    found.put(2.5, 0.0, 4.0)
+    taken = [
+        step
+        for step in range(200)
+        if finder.other_way(NOW + step * nanoseconds(0.05), START, GOAL, path, path.length, ())
+    ]
+    assert 4.0 <= taken[0] * 0.05 <= 6.0  # patience, and one try after it
+
+
+def test_patience_begins_anew_when_the_thing_goes_and_comes() -> None:
+    finder, found = make()
+    path = finder.way(START, GOAL, ())
+    for step in range(200):
+        if step % 40 == 0:
+            found.reset()
+            if step % 80 == 0:
+                found.put(2.5, 0.0, 4.0)
+        stamp = NOW + step * nanoseconds(0.05)
+        assert finder.other_way(stamp, START, GOAL, path, path.length, ()) is None
+
+
+def test_what_lies_behind_or_far_ahead_does_not_matter_yet() -> None:
+    finder, found = make()
+    path = finder.way(START, GOAL, ())
+    found.put(6.0, 0.6, 1.4)
+    assert finder.other_way(NOW, START, GOAL, path, path.length, ()) is None
+    assert finder.other_way(NOW + NANOSECONDS, START, GOAL, path, 0.5, ()) is None
+
+
+def test_one_that_does_not_move_has_not_moved() -> None:
+    finder, _ = make()
+    assert finder.has_moved(Pose2(1.0, 1.0))
+    assert not finder.has_moved(Pose2(1.2, 1.0))
+    assert finder.has_moved(Pose2(1.4, 1.0))
+    assert not finder.has_moved(Pose2(1.4, 1.1))
+
+
+def test_without_surroundings_the_map_is_all_there_is() -> None:
+    planner = make_planner(Scenario('room', walls=(OUTER,), start=(1.0, 1.0, 0.0)))
+    finder = WayFinder(planner)
+    path = finder.way(START, GOAL, ())
+    assert isinstance(path, Path)
+    assert finder.other_way(NOW, START, GOAL, path, path.length, ()) is None
