@@ -43,6 +43,8 @@ STANDING_S, DRIVING_S = 2.0, 28.0
 PIPELINE = ('uwb_driver', 'odom_node', 'fusion_node')
 PARAMETERS = {spec.name: spec.parameters for spec in NODES}
 SILENT = 'imu silent: heading from the wheels'
+BESIDE = (SILENT, 'wheels slip')
+"""What odom_node counts among its refusals beside the messages, all of which it took."""
 LATE = ('ahead of odometry', 'older than the history')
 """Why ranges are refused when a node was not scheduled in time."""
 TRIES = 4
@@ -337,9 +339,12 @@ class Tally:
     def _handled(self, name: str) -> int:
         """Return how many messages were taken or refused."""
         values = self._values(name)
-        # A fall-back on the wheels is counted among the IMU's refusals, beside its messages.
-        silent = int(values.get(f'refused: {SILENT}', 0))
-        return int(values.get('taken', 0)) + int(values.get('refused', 0)) - silent
+        beside = sum(
+            int(value)
+            for key, value in values.items()
+            if any(key.startswith(f'refused: {reason}') for reason in BESIDE)
+        )
+        return int(values.get('taken', 0)) + int(values.get('refused', 0)) - beside
 
     def lost(self) -> dict[str, tuple[int, int]]:
         """Return how many messages of each stream were lost, and of how many."""
