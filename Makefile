@@ -22,7 +22,7 @@ help: ## List the targets
 setup: ## Make the environment and build every package; quick when nothing changed
 	@$(SETUP)
 
-demo: setup ## Deliver a meal in the simulated restaurant; results in out/demo/
+demo: setup ## Deliver meals in the simulated restaurant; results in out/demo/
 	@$(ENV) && tablerunner demo $(ARGS)
 
 test: setup ## Run all tests
