@@ -45,7 +45,7 @@ CORE = 'src/tablerunner/test/'
 FIRST = ('test/bringup/', 'test/bags/', 'nav_controller/test/', 'src/tablerunner_bringup/test/')
 """What takes longest, and would keep one worker busy after the others if it came late."""
 
-ONE_BY_ONE = ('test/bringup/', 'nav_controller/test/')
+ONE_BY_ONE = ('test/bringup/',)
 """Long tests that share nothing; of all other modules one worker runs the whole."""
 
 TOGETHER = ('test/bags/test_simulated_run.py', 'test/bags/test_cut_bag.py')

@@ -92,6 +92,14 @@ class Drive:
         with BagReader(self.bag) as bag:
             return Counter({topic.name: topic.count for topic in bag.topics})
 
+    @functools.cached_property
+    def refusals(self) -> Counter[str]:
+        """How often `replay` refuses for each reason: a busy machine leaves gaps in the bag."""
+        found: Counter[str] = Counter()
+        for (_, reason), count in self.replay().refusals.items():
+            found[reason] += count
+        return found
+
 
 @dataclass(frozen=True)
 class Played:
@@ -324,6 +332,7 @@ class Tally:
     def __init__(self, probe: Probe, drive: Drive, nodes: Sequence[str]) -> None:
         self._probe = probe
         self._due = {'odom_node: joint_states': drive.counts['/joint_states']}
+        self._drive = drive
         self._imu = drive.counts['/imu/data']
         if self._imu:
             self._due['odom_node: imu/data'] = self._imu
@@ -356,18 +365,21 @@ class Tally:
         """Whether all messages have been handled; never, where best effort lost some."""
         return not any(missing for missing, _ in self.lost().values())
 
+    def _refused(self, name: str, reason: str) -> int:
+        """Return how often a stream was refused for a reason more than `replay` refuses."""
+        key = f'refused: {reason}'
+        told = sum(int(v) for k, v in self._values(name).items() if k.startswith(key))
+        expected = sum(n for k, n in self._drive.refusals.items() if k.startswith(reason))
+        return max(told - expected, 0)
+
     def losses(self) -> tuple[str, ...]:
         """Return in words what more was lost, or came too late, than `ALLOWED`."""
         found = []
         for name, (missing, count) in self.lost().items():
-            late = sum(
-                int(value)
-                for key, value in self._values(name).items()
-                if any(key.startswith(f'refused: {reason}') for reason in LATE)
-            )
+            late = sum(self._refused(name, reason) for reason in LATE)
             if missing + late > ALLOWED * count:
                 found.append(f'{name}: {missing} of {count} lost, {late} too late')
-        fallbacks = int(self._values('odom_node: imu/data').get(f'refused: {SILENT}', 0))
+        fallbacks = self._refused('odom_node: imu/data', SILENT)
         if self._imu and fallbacks:
             found.append(f'{SILENT}, {fallbacks} times')
         return tuple(found)
