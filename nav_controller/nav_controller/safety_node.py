@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -26,6 +27,7 @@ from tablerunner.scenario import DriveLimits, load_scenario
 from tablerunner.types import NANOSECONDS, Refusal, Velocity, nanoseconds
 from tablerunner_ros.clocks import now_ns, steady_ns, steady_timer
 from tablerunner_ros.conversions.odometry import odometry_from_message
+from tablerunner_ros.conversions.stamp import stamp_from_message
 from tablerunner_ros.conversions.ultrasonic import ultrasonic_from_message
 from tablerunner_ros.conversions.velocity import (
     velocity_from_message,
@@ -76,7 +78,7 @@ class SafetyNode(Node):
         for frame in mounts:
             self._diagnostics.watch(f'ultrasonic/{frame}', config.safety.ultrasonic_timeout)
             topic = 'ultrasonic/' + frame.removeprefix('ultrasonic_')
-            self._listen(Range, topic, self._on_range)
+            self._listen(Range, topic, partial(self._on_range, frame))
         self._diagnostics.describe(self._describe)
         self._listen(Odometry, POSE, self._on_pose)
         self._listen(DiagnosticStatus, 'fusion_state', self._on_fusion)
@@ -90,27 +92,34 @@ class SafetyNode(Node):
         self.create_subscription(type_, topic, callback, qos_for(topic, subscriber=True))
 
     def _on_command(self, message: Twist | TwistStamped) -> None:
-        velocity = velocity_from_message(message, COMMAND)
+        velocity = velocity_from_message(message, COMMAND, self._config.base_frame)
         if isinstance(velocity, Refusal):
             self._diagnostics.refuse(velocity)
             return
         self._command, self._command_stamp = velocity, now_ns(self)
+        if isinstance(message, TwistStamped):  # it is as old as it says, not as it came
+            stamp = stamp_from_message(message.header.stamp)
+            self._command_stamp = min(stamp, self._command_stamp) or self._command_stamp
         self._send(self._decide())
+        self._show()
         self._diagnostics.take(COMMAND, self._command_stamp)
 
-    def _on_range(self, message: Range) -> None:
+    def _on_range(self, frame: str, message: Range) -> None:
         sample = ultrasonic_from_message(message)
         refusal = sample
-        if not isinstance(sample, Refusal):
+        if message.header.frame_id != frame:
+            refusal = Refusal(0, ULTRASONIC, '', f'not in frame {frame}')
+        elif not isinstance(sample, Refusal):
             refusal = self._stop.add_reading(sample, now_ns(self))
         if refusal is not None:
-            source = f'{ULTRASONIC}/{message.header.frame_id}'
+            source = f'{ULTRASONIC}/{frame}'
             self._diagnostics.refuse(Refusal(refusal.stamp, source, '', refusal.reason))
             return
         before = self._decision
         decision = self._decide()
         if before is None or decision.velocity.linear_m_s < before.velocity.linear_m_s:
             self._send(decision)  # braking does not wait for the next command
+        self._show()
         self._diagnostics.take(f'{ULTRASONIC}/{sample.sensor}', sample.stamp)
 
     def _on_pose(self, message: Odometry) -> None:
@@ -132,6 +141,7 @@ class SafetyNode(Node):
         decision = self._decide()
         if steady_ns() - self._sent_at >= nanoseconds(1.0 / self._config.watch_rate):
             self._send(decision)
+        self._show()
 
     def _decide(self) -> SafetyDecision:
         now, steady = now_ns(self), steady_ns()
@@ -151,7 +161,6 @@ class SafetyNode(Node):
         self._decision = self._stop.step(
             now, self._command, self._command_stamp, self._localisation, motion, fault
         )
-        self._show(self._decision, steady)
         return self._decision
 
     def on_end(self) -> None:
@@ -169,7 +178,11 @@ class SafetyNode(Node):
             message = velocity_to_twist(velocity)
         self._velocity.publish(message)
 
-    def _show(self, decision: SafetyDecision, steady: int) -> None:
+    def _show(self) -> None:
+        """Tell of the last decision: after it is sent, for the wheels come first."""
+        decision, steady = self._decision, steady_ns()
+        if decision is None:
+            return
         shown = (decision.state, decision.reasons)
         changed = shown != self._state_shown
         if changed or steady - self._state_at >= _STATE_PERIOD_NS:
@@ -179,6 +192,7 @@ class SafetyNode(Node):
     def _on_emergency(self, _request: Any, response: Trigger.Response) -> Trigger.Response:
         self._stop.trigger()
         self._send(self._decide())
+        self._show()
         self.get_logger().warning('emergency stop')
         response.success, response.message = True, 'stopped until released'
         return response

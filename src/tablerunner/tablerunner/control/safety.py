@@ -316,12 +316,12 @@ class SafetyStop:
             ways - approach * heard.ages_s, config.delay, config.deceleration, approach
         )
         # Who comes nearer, however slowly, may come on: the robot has to stand when he is there.
-        paces = heard.paces_m_s
-        met = largest_speed(
-            gaps - config.margin - paces * heard.ages_s, config.delay, config.deceleration, paces
-        )
-        coming = (paces > 0.0) & (heard.points[:, 0] > 0.0)
-        speeds = np.where(coming, np.minimum(speeds, met), speeds)
+        coming = (heard.paces_m_s > 0.0) & (heard.points[:, 0] > 0.0)
+        if coming.any():
+            pace = heard.paces_m_s[coming]
+            room = gaps[coming] - config.margin - pace * heard.ages_s[coming]
+            met = largest_speed(room, config.delay, config.deceleration, pace)
+            speeds[coming] = np.minimum(speeds[coming], met)
         beside = largest_speed(
             gaps * _SLANT - config.side_margin, config.delay, config.deceleration
         )

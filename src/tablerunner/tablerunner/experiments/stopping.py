@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.control import SafetyConfig, stopping_distance
+from tablerunner.experiments.crowd import hits_in_crowd
 from tablerunner.experiments.experiment import Bound, Outcome, Progress, Row, Spread
 from tablerunner.experiments.guarded_drive import POSE, GuardedDrive
 from tablerunner.experiments.seeds import run_seeds
@@ -34,12 +35,17 @@ WALKERS_M_S = (0.4, 0.7, 1.0)
 SIDES_DEG = (0, 25, 40, 60)
 """From where somebody walks up to the robot, seen from it: always on collision course."""
 
+CROWDS = {'crowd that never gives way': 0.0, 'crowd of whom nine in ten do': 0.9}
+MOST_HITS = 0.1
+"""In each run, on average: one in ten runs."""
+
 SILENCES = ('command', 'pose', 'ultrasonic_left')
 FAULT_M_S = 0.05
 """Who is touched by a robot that moves towards him faster has been hit by it."""
 
 _SIDE_M = 24.0
 _CENTRE = (6.0, 12.0)
+_UP_TO_SPEED_S = 3.0
 _STANDS_M_S = 0.005
 _LONGEST_S = 20.0
 _MEET_S = 5.0  # from the start until robot and walker would meet
@@ -81,15 +87,22 @@ class Stop:
 def run_stopping(seeds: Sequence[int], progress: Progress) -> Outcome:
     """Measure all stops for many seeds."""
     stops: dict[str, list[Stop]] = {}
-    for run in run_seeds(stops_of, list(seeds), progress):
+    hits: list[tuple[int, ...]] = []
+    for run, counts in run_seeds(_run_seed, list(seeds), progress):
+        hits.append(counts)
         for name, stop in run:
             stops.setdefault(name, []).append(stop)
+    rows = [row for name, some in stops.items() for row in _rows(name, some)]
+    rows += [
+        Row(f'{name}, hits', '1', Spread.of(counts), bound=Bound(high=MOST_HITS))
+        for name, counts in zip(CROWDS, zip(*hits, strict=True), strict=True)
+    ]
     config = SafetyConfig()
     return Outcome(
         'stop-test',
         'Until the robot stands: measured in the simulator, against what is computed',
         tuple(seeds),
-        tuple(row for name, some in stops.items() for row in _rows(name, some)),
+        tuple(rows),
         partial(draw, stops=[stop for some in stops.values() for stop in some]),
         {
             'delay [s]': config.delay,
@@ -108,8 +121,14 @@ def run_stopping(seeds: Sequence[int], progress: Progress) -> Outcome:
             'Walkers come from so many degrees aside, seen from the robot, on collision course, '
             'and never give way; those too slow for that walk across. A robot that moves at more '
             f'than {FAULT_M_S} m/s towards whom it touches has hit him.',
+            'Crowd: 25 s in a hall of 10 m x 8 m with six people, some of whom start or turn so '
+            'near before the robot that no brakes would do.',
         ),
     )
+
+
+def _run_seed(seed: int) -> tuple[list[tuple[str, Stop]], tuple[int, ...]]:
+    return stops_of(seed), tuple(hits_in_crowd(seed, gives_way) for gives_way in CROWDS.values())
 
 
 def _rows(name: str, stops: Sequence[Stop]) -> list[Row]:
@@ -153,7 +172,7 @@ def stops_of(seed: int) -> list[tuple[str, Stop]]:
 def emergency(seed: int, speed_m_s: float) -> Stop:
     """Trigger the emergency stop at a speed, the way ahead being free."""
     drive = GuardedDrive(_hall(), seed, Pose2(*_CENTRE))
-    drive.run(Velocity(speed_m_s, 0.0), 2.0 + 0.01 * (seed % 20))
+    drive.run(Velocity(speed_m_s, 0.0), _UP_TO_SPEED_S + 0.01 * (seed % 20))
     drive.safety.trigger()
     return _stopped(drive, 'emergency', speed_m_s, speed_m_s)
 
@@ -161,7 +180,7 @@ def emergency(seed: int, speed_m_s: float) -> Stop:
 def silence(seed: int, what: str, speed_m_s: float = SPEEDS_M_S[-1]) -> Stop:
     """Let commands, poses or a sensor fall silent at a speed, the way ahead being free."""
     drive = GuardedDrive(_hall(), seed, Pose2(*_CENTRE))
-    drive.run(Velocity(speed_m_s, 0.0), 2.0 + 0.01 * (seed % 20))
+    drive.run(Velocity(speed_m_s, 0.0), _UP_TO_SPEED_S + 0.01 * (seed % 20))
     drive.withheld.add(POSE if what == 'pose' else what)
     command = None if what == 'command' else speed_m_s
     return _stopped(drive, 'silence', speed_m_s, command, drive.safety.config.command_timeout)

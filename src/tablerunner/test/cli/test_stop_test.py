@@ -22,7 +22,9 @@ def test_stop_test_writes_figures_and_fails_when_a_bound_is_missed(
 ) -> None:
     stop = Stop('emergency', 0.6, way_m, 0.405)
     monkeypatch.setattr(
-        stopping, 'run_seeds', lambda run, seeds, progress: [[('stop', stop)] for _ in seeds]
+        stopping,
+        'run_seeds',
+        lambda run, seeds, progress: [([('stop', stop)], (0, 0)) for _ in seeds],
     )
     figures = tmp_path / 'figures.json'
     options = ['--seeds', '3', '--seed', '7', '-o', str(tmp_path), '--json', str(figures)]

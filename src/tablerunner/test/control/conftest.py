@@ -21,9 +21,10 @@ from tablerunner.control import (
     home_of,
     make_planner,
 )
+from tablerunner.experiments.crowd import crowd_hall
 from tablerunner.experiments.guarded_drive import GuardedDrive
 from tablerunner.geometry.pose import Pose2
-from tablerunner.scenario import Person, Scenario, Wall, load_scenario
+from tablerunner.scenario import Scenario, load_scenario
 from tablerunner.types import Velocity
 
 SCENARIOS = Path(__file__).parents[3] / 'tablerunner_bringup' / 'scenarios'
@@ -130,28 +131,4 @@ def make_delivery() -> type[Delivery]:
 @pytest.fixture
 def hall() -> Callable[[int, float], Scenario]:
     """Return a maker of rooms of 10 m x 8 m, bare but for six people."""
-
-    def make(seed: int, yield_probability: float) -> Scenario:
-        random = np.random.default_rng(seed)
-        people = tuple(
-            Person(
-                name=f'person {number}',
-                route=tuple(
-                    (float(random.uniform(0.6, 9.4)), float(random.uniform(0.6, 7.4)))
-                    for _ in range(3)
-                ),
-                speed=float(random.uniform(0.4, 1.2)),
-                yield_probability=yield_probability,
-                start_share=float(random.uniform(0.0, 1.0)),
-            )
-            for number in range(6)
-        )
-        corners = ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0), (0.0, 8.0))
-        return Scenario(
-            name='hall',
-            walls=(Wall(name='wall', closed=True, points=corners),),
-            people=people,
-            start=(5.0, 4.0, float(random.uniform(-3.1, 3.1))),
-        )
-
-    return make
+    return crowd_hall

@@ -98,10 +98,13 @@ def test_outcome_fails_when_one_stop_of_many_was_too_long(
         (2, {'way_m': 0.6}),
         (2, {'touch_m_s': 0.06}),
     )
-    monkeypatch.setattr(stopping, 'run_seeds', lambda run, seeds, progress: [good, good])
+    none = (0, 0)
+    monkeypatch.setattr(stopping, 'run_seeds', lambda *_: [(good, none), (good, none)])
     assert run_stopping(range(2), lambda done, count: None).holds
+    monkeypatch.setattr(stopping, 'run_seeds', lambda *_: [(good, none), (good, (1, 0))])
+    assert not run_stopping(range(2), lambda done, count: None).holds
     for index, changes in worse:
         bad = list(good)
         bad[index] = (good[index][0], replace(good[index][1], **changes))
-        monkeypatch.setattr(stopping, 'run_seeds', lambda *_, bad=bad: [good, bad])
+        monkeypatch.setattr(stopping, 'run_seeds', lambda *_, bad=bad: [(good, none), (bad, none)])
         assert not run_stopping(range(2), lambda done, count: None).holds, changes
