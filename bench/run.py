@@ -11,14 +11,17 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import camera
+import drive_rooms
 import filter_step
 import fuzzy
 import latency
 import memory
 import monte_carlo
 import offline
+import particles
 import processor
 import protocols
+import safety
 import solvers
 from result import Result
 from rich.console import Console
@@ -30,10 +33,13 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'solvers': solvers.measure,
     'offline': offline.measure,
     'latency': latency.measure,
+    'safety': safety.measure,
     'processor': processor.measure,
     'memory': memory.measure,
     'fuzzy': fuzzy.measure,
     'protocols': protocols.measure,
+    'drive_rooms': drive_rooms.measure,
+    'particles': particles.measure,
     'camera': camera.measure,
 }
 WITH_BAR = {'solvers', 'monte_carlo'}

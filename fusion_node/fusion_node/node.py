@@ -12,13 +12,12 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import MagneticField
 
-from fusion_node.output import EstimateOutput
+from fusion_node.output import EstimateOutput, level_of
 from fusion_node.params import FusionNodeConfig
 from fusion_node.services import FusionServices
 from tablerunner.estimation import (
     Localizer,
     LocalizerConfig,
-    LocalizerState,
     Outcome,
     SmootherConfig,
 )
@@ -31,7 +30,7 @@ from tablerunner_ros.conversions.innovation import innovation_to_message, refusa
 from tablerunner_ros.conversions.odometry import odometry_from_message
 from tablerunner_ros.conversions.pose import pose_from_message
 from tablerunner_ros.conversions.uwb_range import range_from_message
-from tablerunner_ros.diagnostics import ERROR, OK, WARN, Diagnostics, Report
+from tablerunner_ros.diagnostics import Diagnostics, Report
 from tablerunner_ros.parameters import declare_config
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.spin import spin_node
@@ -40,13 +39,6 @@ from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
 ODOM, RANGES, ANCHORS, START = 'odom', 'uwb/ranges', 'uwb/anchors', 'initialpose'
 MAGNETIC = 'imu/mag'
 FIX = 'uwb/pose'  # also made of ranges inside, for estimators that take positions
-
-_LEVELS = {
-    LocalizerState.WAITING: WARN,
-    LocalizerState.ALIGNING: WARN,
-    LocalizerState.TRACKING: OK,
-    LocalizerState.LOST: ERROR,
-}
 
 
 class FusionNode(Node):
@@ -117,6 +109,7 @@ class FusionNode(Node):
         place = self._localizer.map_to_odom
         if place is not None and outcome.estimate is not None:
             self._output.transform(outcome.estimate, place, self._localizer.starts)
+        self._output.state(self._localizer.status)
         self._count(outcome, ODOM, sample.stamp)
 
     def _on_sample(
@@ -131,6 +124,7 @@ class FusionNode(Node):
             return
         outcome = take(sample)
         self._publish(outcome)
+        self._output.state(self._localizer.status)
         self._count(outcome, source, sample.stamp)
 
     def _start(self, source: str, message: PoseWithCovarianceStamped) -> str:
@@ -141,6 +135,7 @@ class FusionNode(Node):
             return refusal.reason
         outcome = self._localizer.set_pose(sample)
         self._publish(outcome)
+        self._output.state(self._localizer.status)
         self._count(outcome, source, sample.stamp)
         if outcome.refusals:
             return outcome.refusals[0].reason
@@ -205,7 +200,7 @@ class FusionNode(Node):
 
     def _describe(self, report: Report) -> None:
         status = self._localizer.status
-        report.add(WARN if status.degraded else _LEVELS[status.state], status.words)
+        report.add(level_of(status), status.words)
         report.values['state'] = status.state.value
         report.values['pose by'] = '' if status.cause is None else status.cause.value
         report.values['estimator'] = self._localizer.config.estimator

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import MagneticField
@@ -105,6 +106,27 @@ def test_fusion_unknown_start_is_not_confident_before_it_is_known(probe: Probe) 
     assert fusion.settled().pose.covariance[35] < 0.05
     fusion.probe.wait_for(lambda: fusion.tf, 'map to odom')
     fusion.probe.wait_diagnostic('fusion_node', 'state', 'tracking')
+
+
+def test_fusion_state_says_when_it_is_lost_and_found(fusion: Fusion) -> None:
+    """A robot that was carried off: at each change, and to those who come late."""
+    states = fusion.probe.listen(DiagnosticStatus, 'fusion_state')
+
+    def heard(index: int) -> list[str]:
+        return [status.values[index].value for status in states]
+
+    fusion.drive(0.5, 0.2, 50)
+    fusion.probe.wait_for(lambda: heard(0)[-1:] == ['tracking'], 'tracking')
+    fusion.truth = Pose2(7.0, 7.0, -2.0)
+    fusion.drive(0.5, 0.2, 300)
+    fusion.probe.wait_for(lambda: 'lost' in heard(0), 'lost')
+    told = next(status for status in states if status.values[0].value == 'lost')
+    assert (told.name, told.level) == ('fusion_node', DiagnosticStatus.ERROR)
+    fusion.drive(0.5, 0.2, 400)
+    fusion.probe.wait_for(lambda: heard(0)[-1] == 'tracking', 'tracking again')
+    assert heard(1)[-1] == 'fused'
+    assert len(states) < 12  # changes only
+    assert fusion.error()[0] < 0.1
 
 
 @pytest.mark.parametrize(

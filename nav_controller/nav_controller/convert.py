@@ -146,6 +146,11 @@ def localisation_of(sample: OdometrySample) -> Localisation:
     return Localisation(sample.stamp, position, heading)
 
 
+def is_lost(message: DiagnosticStatus) -> bool:
+    """Return whether localisation says on fusion_state that it is lost."""
+    return any(item.key == 'state' and item.value == 'lost' for item in message.values)
+
+
 def safety_to_message(decision: SafetyDecision, emergency: bool) -> DiagnosticStatus:
     """Return what the safety stop does and why, as on safety_state."""
     values = {

@@ -9,12 +9,14 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 
+from nav_controller.assembly import assemble
 from nav_controller.convert import (
     destinations_from_goal,
     feedback_from_queue,
     feedback_from_status,
 )
 from nav_controller.deliver_server import DeliverServer
+from nav_controller.follow_mode import FollowMode
 from nav_controller.outputs import Outputs
 from nav_controller.params import NavNodeConfig
 from nav_controller.requests import Requests
@@ -25,15 +27,9 @@ from tablerunner.control import (
     DeliveryStore,
     Destination,
     Dispatcher,
-    Mission,
     MissionState,
     MissionStatus,
     Situation,
-    configure_controller,
-    home_of,
-    limits_within,
-    make_controller,
-    make_planner,
 )
 from tablerunner.errors import MissionError, PlanningError
 from tablerunner.scenario import load_scenario
@@ -56,17 +52,8 @@ class NavNode(Node):
         super().__init__('nav_controller', **options)
         self._config = config = declare_config(self, NavNodeConfig, on_change=self._configure)
         self._scenario = scenario = load_scenario(config.scenario)
-        limits = limits_within(config.limits, scenario.robot.limits)
-        self._controller = make_controller(
-            config.controller,
-            limits,
-            scenario.robot,
-            config.controllers,
-            config.ultrasonic_frames,
-        )
-        self._controller.explain(config.publish_trace)
-        self._planner = make_planner(scenario, config.planner)
-        self._mission = Mission(config.mission, self._planner, self._controller, home_of(scenario))
+        self._parts = assemble(config, scenario)
+        self._mission = self._parts.mission
         self._battery = Battery(config.battery)
         self._store = DeliveryStore(Path(config.queue_file)) if config.queue_file else None
         self._dispatcher = Dispatcher(
@@ -85,6 +72,7 @@ class NavNode(Node):
         self._diagnostics.describe(self._describe)
         self._deliver = DeliverServer(self, self._begin, self._dispatcher.cancel)
         self._requests = Requests(self, self._dispatcher)
+        self._follow = FollowMode(self, config, scenario, self._diagnostics, self._dispatcher)
         for type_, topic, callback in (
             (PoseStamped, GOAL, self._on_goal),
             (PathMessage, WAYPOINTS, self._on_waypoints),
@@ -120,6 +108,7 @@ class NavNode(Node):
     def _go(self, source: str, stops: tuple[Destination, ...]) -> None:
         """Drive to places for a topic; that replaces what came by topic, never a delivery."""
         try:
+            self._follow.require_idle()
             self._dispatcher.go(stops, now_ns(self))
         except (MissionError, PlanningError) as error:
             self._refuse(source, str(error))
@@ -132,6 +121,7 @@ class NavNode(Node):
         stamp = now_ns(self)
         try:
             stops = destinations_from_goal(goal, self._scenario, self._config.map_frame)
+            self._follow.require_idle()
             if not stops:
                 raise MissionError('a delivery needs at least one stop')
             delivery = Delivery(name, self._mission.tour_of(stops, goal.return_home))
@@ -149,12 +139,14 @@ class NavNode(Node):
     def _on_timer(self) -> None:
         stamp = now_ns(self)
         situation = self._senses.situation(stamp)
-        self._controller.hear(self._senses.readings(stamp))
+        readings = self._senses.readings(stamp)
+        self._mission.hear(readings)
         step = self._dispatcher.step(situation)
         self._status = step.status
-        self._outputs.drive(step.velocity, stamp)
+        velocity = self._follow.step(stamp, step.velocity, readings, situation.blocked)
+        self._outputs.drive(velocity, stamp)
         self._outputs.plan(step.status.path, stamp)
-        self._outputs.explain(self._controller.traces, stamp)
+        self._outputs.explain(self._parts.controller.traces, stamp)
         for event in step.events:
             self.get_logger().info(event)
         for ended in step.ended:
@@ -172,12 +164,9 @@ class NavNode(Node):
 
     def _configure(self, config: NavNodeConfig) -> None:
         self._config = config
-        limits = limits_within(config.limits, self._scenario.robot.limits)
-        configure_controller(self._controller, limits, config.controllers)
-        self._controller.explain(config.publish_trace)
-        self._planner = self._planner.configured(config.planner)
-        self._mission.configure(config.mission, self._planner)
+        self._parts.configure(config)
         self._battery.config = config.battery
+        self._follow.configure(config)
 
     def _describe(self, report: Report) -> None:
         status, dispatcher, stamp = self._status, self._dispatcher, now_ns(self)

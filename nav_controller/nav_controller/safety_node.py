@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -11,7 +13,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Range
 from std_srvs.srv import Trigger
 
-from nav_controller.convert import localisation_of, safety_to_message
+from nav_controller.convert import is_lost, localisation_of, safety_to_message
 from nav_controller.params import SafetyNodeConfig
 from tablerunner.control import (
     Localisation,
@@ -25,6 +27,7 @@ from tablerunner.scenario import DriveLimits, load_scenario
 from tablerunner.types import NANOSECONDS, Refusal, Velocity, nanoseconds
 from tablerunner_ros.clocks import now_ns, steady_ns, steady_timer
 from tablerunner_ros.conversions.odometry import odometry_from_message
+from tablerunner_ros.conversions.stamp import stamp_from_message
 from tablerunner_ros.conversions.ultrasonic import ultrasonic_from_message
 from tablerunner_ros.conversions.velocity import (
     velocity_from_message,
@@ -58,7 +61,7 @@ class SafetyNode(Node):
         self._configure(config)
         self._command: Velocity | None = None
         self._command_stamp = 0
-        self._localisation = Localisation()
+        self._localisation, self._lost = Localisation(), False
         self._motion: Velocity | None = None
         self._clock_at, self._clock_seen = 0, steady_ns()
         self._decision: SafetyDecision | None = None
@@ -75,9 +78,10 @@ class SafetyNode(Node):
         for frame in mounts:
             self._diagnostics.watch(f'ultrasonic/{frame}', config.safety.ultrasonic_timeout)
             topic = 'ultrasonic/' + frame.removeprefix('ultrasonic_')
-            self._listen(Range, topic, self._on_range)
+            self._listen(Range, topic, partial(self._on_range, frame))
         self._diagnostics.describe(self._describe)
         self._listen(Odometry, POSE, self._on_pose)
+        self._listen(DiagnosticStatus, 'fusion_state', self._on_fusion)
         self._listen(kind, COMMAND, self._on_command)
         self.create_service(Trigger, 'emergency_stop', self._on_emergency)
         self.create_service(Trigger, 'release', self._on_release)
@@ -88,27 +92,34 @@ class SafetyNode(Node):
         self.create_subscription(type_, topic, callback, qos_for(topic, subscriber=True))
 
     def _on_command(self, message: Twist | TwistStamped) -> None:
-        velocity = velocity_from_message(message, COMMAND)
+        velocity = velocity_from_message(message, COMMAND, self._config.base_frame)
         if isinstance(velocity, Refusal):
             self._diagnostics.refuse(velocity)
             return
         self._command, self._command_stamp = velocity, now_ns(self)
+        if isinstance(message, TwistStamped):  # it is as old as it says, not as it came
+            stamp = stamp_from_message(message.header.stamp)
+            self._command_stamp = min(stamp, self._command_stamp) or self._command_stamp
         self._send(self._decide())
+        self._show()
         self._diagnostics.take(COMMAND, self._command_stamp)
 
-    def _on_range(self, message: Range) -> None:
+    def _on_range(self, frame: str, message: Range) -> None:
         sample = ultrasonic_from_message(message)
         refusal = sample
-        if not isinstance(sample, Refusal):
+        if message.header.frame_id != frame:
+            refusal = Refusal(0, ULTRASONIC, '', f'not in frame {frame}')
+        elif not isinstance(sample, Refusal):
             refusal = self._stop.add_reading(sample, now_ns(self))
         if refusal is not None:
-            source = f'{ULTRASONIC}/{message.header.frame_id}'
+            source = f'{ULTRASONIC}/{frame}'
             self._diagnostics.refuse(Refusal(refusal.stamp, source, '', refusal.reason))
             return
         before = self._decision
         decision = self._decide()
         if before is None or decision.velocity.linear_m_s < before.velocity.linear_m_s:
             self._send(decision)  # braking does not wait for the next command
+        self._show()
         self._diagnostics.take(f'{ULTRASONIC}/{sample.sensor}', sample.stamp)
 
     def _on_pose(self, message: Odometry) -> None:
@@ -118,20 +129,25 @@ class SafetyNode(Node):
         if isinstance(sample, Refusal):
             self._diagnostics.refuse(sample)
             return
-        self._localisation = localisation_of(sample)
+        self._localisation = replace(localisation_of(sample), lost=self._lost)
         self._motion = Velocity(sample.linear_m_s, sample.angular_rad_s)
         self._diagnostics.take(POSE, sample.stamp)
+
+    def _on_fusion(self, message: DiagnosticStatus) -> None:
+        self._lost = is_lost(message)
+        self._localisation = replace(self._localisation, lost=self._lost)
 
     def _on_watch(self) -> None:
         decision = self._decide()
         if steady_ns() - self._sent_at >= nanoseconds(1.0 / self._config.watch_rate):
             self._send(decision)
+        self._show()
 
     def _decide(self) -> SafetyDecision:
         now, steady = now_ns(self), steady_ns()
         if now < self._clock_at - NANOSECONDS:
             self._stop.reset()
-            self._command, self._localisation = None, Localisation()
+            self._command, self._localisation = None, Localisation(lost=self._lost)
         if now != self._clock_at:
             self._clock_at, self._clock_seen = now, steady
         fault = ''
@@ -145,7 +161,6 @@ class SafetyNode(Node):
         self._decision = self._stop.step(
             now, self._command, self._command_stamp, self._localisation, motion, fault
         )
-        self._show(self._decision, steady)
         return self._decision
 
     def on_end(self) -> None:
@@ -163,7 +178,11 @@ class SafetyNode(Node):
             message = velocity_to_twist(velocity)
         self._velocity.publish(message)
 
-    def _show(self, decision: SafetyDecision, steady: int) -> None:
+    def _show(self) -> None:
+        """Tell of the last decision: after it is sent, for the wheels come first."""
+        decision, steady = self._decision, steady_ns()
+        if decision is None:
+            return
         shown = (decision.state, decision.reasons)
         changed = shown != self._state_shown
         if changed or steady - self._state_at >= _STATE_PERIOD_NS:
@@ -173,6 +192,7 @@ class SafetyNode(Node):
     def _on_emergency(self, _request: Any, response: Trigger.Response) -> Trigger.Response:
         self._stop.trigger()
         self._send(self._decide())
+        self._show()
         self.get_logger().warning('emergency stop')
         response.success, response.message = True, 'stopped until released'
         return response

@@ -64,6 +64,7 @@ class Robot:
         self.position_variance, self.heading_variance = 0.0025, 0.0025
         self.localised = True
         self.frame = 'map'
+        self.sensor_frames = {name: f'ultrasonic_{name}' for name in SENSORS}
         self.velocity = Twist()
         if follow:
             probe.node.create_subscription(Twist, follow, self._on_velocity, 1)
@@ -109,7 +110,7 @@ class Robot:
             range=distance,
         )
         message.header.stamp = self.probe.node.get_clock().now().to_msg()
-        message.header.frame_id = f'ultrasonic_{name}'
+        message.header.frame_id = self.sensor_frames[name]
         self.probe.publish(f'ultrasonic/{name}', message)
 
 

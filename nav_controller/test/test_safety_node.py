@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
+from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
@@ -82,6 +83,12 @@ def driving(probe: Probe, robot: Any) -> Driver:
     return driver
 
 
+def fusion_state(probe: Probe, state: str) -> None:
+    values = [KeyValue(key='state', value=state), KeyValue(key='pose by', value='fused')]
+    status = DiagnosticStatus(name='fusion_node', message=state, values=values)
+    probe.publish('fusion_state', status)
+
+
 def call(probe: Probe, service: str) -> Trigger.Response:
     client = probe.node.create_client(Trigger, service)
     probe.wait_for(client.service_is_ready, service)
@@ -117,6 +124,27 @@ def test_bad_readings_are_refused_and_stop(driving: Driver, robot: Any, bad: flo
     )
 
 
+@pytest.mark.parametrize('frame', ['base_link', 'ultrasonic_left', ''])
+def test_reading_in_another_frame_than_its_topic_says_is_refused(
+    driving: Driver, robot: Any, frame: str
+) -> None:
+    """What the left hears must not count as what is ahead, nor the other way round."""
+    robot.sensor_frames['front'] = frame
+    driving.wait_words('ultrasonic_front silent')
+    driving.probe.wait_diagnostic(
+        'safety_stop: ultrasonic/ultrasonic_front',
+        'refused: not in frame ultrasonic_front',
+        lambda count: int(count) > 0,
+    )
+
+
+def test_minus_infinity_touches_the_sensor_and_stops(driving: Driver, robot: Any) -> None:
+    """REP-117; plus infinity is a free way, as all the drives here show."""
+    robot.ranges['front'] = -math.inf
+    driving.wait_words('obstacle: ultrasonic_front')
+    assert driving.stands(0.3)
+
+
 def test_lost_pose_stops(driving: Driver, robot: Any) -> None:
     robot.localised = False
     assert driving.wait_speed(lambda speed: speed == 0.0, 'a stop') < 1.0
@@ -129,6 +157,23 @@ def test_pose_in_another_frame_is_no_pose(driving: Driver, robot: Any) -> None:
     driving.probe.wait_diagnostic(
         'safety_stop: odometry/filtered', 'refused: not in frame map', lambda n: int(n) > 0
     )
+
+
+def test_robot_that_is_lost_slows_and_stops_until_it_is_found(driving: Driver) -> None:
+    """Localisation says so itself on fusion_state; the pose looks as certain as before."""
+    probe = driving.probe
+    assert probe.set_parameter('safety_stop', 'safety.search_distance', 0.2) == ''
+    probe.speak(DiagnosticStatus, 'fusion_state')
+    probe.connected('fusion_state')
+    fusion_state(probe, 'tracking')
+    assert not driving.stands(0.2)
+    fusion_state(probe, 'lost')
+    driving.wait_speed(lambda speed: speed == pytest.approx(0.2), 'a slower speed')
+    status = driving.wait_words('lost: driven far enough so')
+    assert status.level == DiagnosticStatus.ERROR
+    assert driving.stands(0.3)
+    fusion_state(probe, 'tracking')
+    driving.wait_speed(lambda speed: speed >= 0.299, 'the commanded speed again')
 
 
 def test_uncertain_position_slows_and_stops(driving: Driver, robot: Any) -> None:
@@ -246,15 +291,29 @@ def test_stamped_commands_by_parameter(probe: Probe, make_robot: Callable[..., A
     probe.host(SafetyNode, parameter_overrides=[Parameter('twist_stamped', value=True)])
     probe.speak(TwistStamped, 'cmd_vel_nav')
 
+    frame, late_s = [''], [0.0]
+
     def command() -> None:
         message = TwistStamped()
         message.twist = twist(0.1)
+        message.header.frame_id = frame[0]
+        stamp = probe.node.get_clock().now() - Duration(seconds=late_s[0])
+        message.header.stamp = stamp.to_msg()
         probe.publish('cmd_vel_nav', message)
 
     probe.node.create_timer(0.05, command)
     probe.wait_for(lambda: heard and heard[-1].twist.linear.x == pytest.approx(0.1), 'driving')
     assert heard[-1].header.frame_id == 'base_link'
     assert heard[-1].header.stamp.sec > 0
+    frame[0] = 'map'
+    probe.wait_for(lambda: heard[-1].twist.linear.x == 0.0, 'a stop')
+    probe.wait_diagnostic(
+        'safety_stop: cmd_vel_nav', 'refused: not in frame base_link', lambda n: int(n) > 0
+    )
+    frame[0] = 'base_link'
+    probe.wait_for(lambda: heard[-1].twist.linear.x == pytest.approx(0.1), 'driving again')
+    late_s[0] = 0.6  # they come as often, but tell of the past
+    probe.wait_for(lambda: heard[-1].twist.linear.x == 0.0, 'a stop for old commands')
 
 
 def test_geometry_comes_from_the_scenario(probe: Probe, room: Path) -> None:

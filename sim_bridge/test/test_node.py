@@ -32,7 +32,13 @@ anchors:
   - {id: A2, position: [9.9, 9.9, 2.25]}
   - {id: A3, position: [0.1, 9.9, 2.25]}
 people:
-  - {name: guest, route: [[2.0, 8.0], [8.0, 8.0]]}
+  - {name: guest, route: [[2.0, 8.0], [8.0, 8.0]], tag: {id: guest_tag}}
+robot:
+  anchors:
+    - {id: R0, position: [0.17, 0.17, 1.0]}
+    - {id: R1, position: [-0.17, 0.17, 1.0]}
+    - {id: R2, position: [-0.17, -0.17, 1.0]}
+    - {id: R3, position: [0.17, -0.17, 1.0]}
 start: [3.0, 5.0, 0.0]
 sensors:
   uwb: {loss_probability: 0.0}
@@ -46,6 +52,7 @@ STREAMS: dict[str, tuple[type[Any], float]] = {
     'imu/data': (Imu, 100.0),
     'imu/mag': (MagneticField, 20.0),
     'uwb/exchanges': (UwbExchange, 40.0),
+    'person/exchanges': (UwbExchange, 40.0),
     'people': (PoseArray, 10.0),
     **{f'ultrasonic/{name}': (Range, 1.0 / 0.15) for name in NAMES},
 }
@@ -94,6 +101,9 @@ def test_node_topics_come_at_the_rates_of_the_contract(
     frames = {topic: heard[topic][0].header.frame_id for topic in STREAMS if topic != 'clock'}
     assert frames['imu/data'] == frames['imu/mag'] == 'imu_link'
     assert frames['uwb/exchanges'] == 'uwb_tag'
+    assert frames['person/exchanges'] == 'guest_tag'
+    assert {message.tag_id for message in heard['uwb/exchanges']} == {'tag'}
+    assert {message.tag_id for message in heard['person/exchanges']} == {'guest_tag'}
     assert frames['ground_truth'] == frames['people'] == 'map'
     for name in NAMES:
         assert frames[f'ultrasonic/{name}'] == f'ultrasonic_{name}'

@@ -17,6 +17,24 @@ LIMIT_S = 280.0
 """Ends a hang; a run takes half a minute, several times that on a busy machine."""
 
 DELIVER = ('--deliver', 'table_1', '--wait', '0.5')
+BUSY = """\
+name: busy room
+walls:
+  - {name: hull, closed: true, points: [[0, 0], [9.4, 0], [9.4, 5], [0, 5]]}
+boxes:
+  - {name: crates, x: 3.4, y: 2.05, length: 0.4, width: 0.5, unmapped: true}
+kitchen: {stop: [1.2, 2.5, 0.0]}
+tables:
+  - {name: table_1, x: 4.8, y: 4.5, length: 0.8, width: 0.6, stop: [4.8, 2.5, 0.0]}
+  - {name: table_2, x: 9.0, y: 2.5, length: 0.4, width: 0.6, stop: [8.3, 2.5, 0.0]}
+people:
+  - {name: guest, route: [[6.9, 2.1]]}
+anchors:
+  - {id: A0, position: [0.2, 0.2, 2.25]}
+  - {id: A1, position: [9.2, 0.2, 2.25]}
+  - {id: A2, position: [9.2, 4.8, 2.25]}
+  - {id: A3, position: [0.2, 4.8, 2.25]}
+"""
 RECORDED = ('/odometry/filtered', '/ground_truth', '/uwb/exchanges', '/tf_static', '/uwb/anchors')
 
 
@@ -80,19 +98,29 @@ def demo(processes, room, folder, *arguments):
     """Run the demo to its end; return exit code, output and errors.json."""
     process = processes.start(
         *(sys.executable, '-m', 'tablerunner.cli.main', 'demo', '--scenario', room),
-        *('--table', 'table_1', '-o', folder, '--domain', str(processes.domain), *arguments),
+        *('-o', folder, '--domain', str(processes.domain), *arguments),
     )
     code = process.wait(150.0)
     return code, process.output, json.loads((folder / 'errors.json').read_text(encoding='utf-8'))
 
 
-def test_demo_writes_bag_picture_and_errors(processes, room, tmp_path):
-    """The three results are there, and the error is that of a robot that knows where it is."""
-    folder = tmp_path / 'demo'
+def test_demo_passes_what_is_in_the_way_and_writes_its_results(processes, tmp_path):
+    """Two tables, crates that the map does not know, a guest who stands, an emergency stop."""
+    folder, room = tmp_path / 'demo', tmp_path / 'busy.yaml'
+    room.write_text(BUSY, encoding='utf-8')
     code, said, errors = demo(processes, room, folder)
     assert code == 0, said
     assert errors['delivered'] is True
-    assert errors['reached'] == ['table_1', 'kitchen']
+    assert errors['failures'] == []
+    assert errors['reached'] == ['table_1', 'table_2', 'kitchen']
+    assert set(errors['checks']) == {
+        'way blocked by crates',
+        'guest in the way',
+        'emergency stop',
+    }
+    assert all(check['passed'] for check in errors['checks'].values())
+    assert 'emergency stop asked for at' in said
+    assert any(halt['emergency'] and halt['duration'] > 2.5 for halt in errors['halts'])
     assert errors['position_error']['compared'] > 500
     assert errors['position_error']['rmse'] < 0.25
     assert (folder / 'trip.png').read_bytes().startswith(b'\x89PNG')
@@ -102,7 +130,9 @@ def test_demo_writes_bag_picture_and_errors(processes, room, tmp_path):
 
 def test_demo_out_of_time_fails_and_says_so(processes, room, tmp_path):
     """A meal that is late is not delivered."""
-    code, said, errors = demo(processes, room, tmp_path / 'demo', '--time-limit', '4')
+    code, said, errors = demo(
+        processes, room, tmp_path / 'demo', '--table', 'table_1', '--time-limit', '4'
+    )
     assert code == 1
     assert 'took too long' in said
     assert errors['delivered'] is False

@@ -11,7 +11,7 @@ from tablerunner.control import SafetyConfig, stopping_distance
 from tablerunner.types import seconds
 from tablerunner_bringup.monitor import Monitor, Movement
 
-DRIVING_M_S = 0.35
+DRIVING_M_S = 0.45
 HOLD_S = 3.0
 ASK_AGAIN_S = 1.0
 REQUEST_S = 0.5

@@ -40,6 +40,8 @@ def test_qos_publisher_and_subscriber_are_compatible(topic: str) -> None:
         ('initialpose', True, 10, False),
         ('goal_pose', True, 10, False),
         ('waypoints', True, 10, False),
+        ('fusion_state', True, 1, True),
+        ('safety_state', True, 1, True),
         ('cmd_vel_nav', True, 1, False),
         ('cmd_vel', True, 1, False),
         ('ground_truth', True, 10, False),

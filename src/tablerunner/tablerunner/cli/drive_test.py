@@ -56,18 +56,21 @@ def drive_test(
     from tablerunner.cli.bar import Bar
     from tablerunner.cli.json_file import write_json
     from tablerunner.control import CONTROLLERS
+    from tablerunner.errors import ConfigError
     from tablerunner.experiments.drive_record import load_room
     from tablerunner.experiments.drive_test import run_drive_test
     from tablerunner.experiments.random_room import make_drive_room
 
     names = CONTROLLERS if controller == 'all' else (controller,)
+    if room is not None and replay is not None:
+        raise ConfigError('--replay', str(replay), 'one of --room and --replay')
     if room is not None or replay is not None:
         one = load_room(replay) if replay is not None else make_drive_room(room or 0)
         _drive_one(one, names, output)
         return
     with Bar('drive-test') as bar:
         test = run_drive_test(range(first_seed, first_seed + rooms), names, bar.show, jobs)
-    console = Console(highlight=False, width=None if Console().is_terminal else 120)
+    console = Console(highlight=False, width=None if Console().is_terminal else 140)
     console.print(table_of(test, rooms, first_seed))
     for drive in test.failed:
         console.print(f'room {drive.seed}, {drive.controller}: ' + '; '.join(drive.faults))
@@ -158,19 +161,17 @@ def table_of(test: 'DriveTest', rooms: int, first_seed: int) -> 'Table':
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
-    for index, heading in enumerate(
-        ('', 'unit', 'mean', 'median', '5 %', '95 %', 'least', 'largest', 'of', 'asked', '')
-    ):
-        table.add_column(heading, justify='right' if index > 1 else 'left', no_wrap=True)
+    headings = ('', 'mean', 'median', '5 %', '95 %', 'least', 'largest', 'of', 'asked', '')
+    for index, heading in enumerate(headings):
+        table.add_column(heading, justify='right' if index else 'left', no_wrap=True)
     for row in test.rows():
         spread = row.measured
         figures = (spread.mean, spread.median, spread.p5, spread.p95, spread.low, spread.high)
         asked = '' if row.bound is None else str(row.bound)
         verdict = '' if row.bound is None else 'kept' if row.holds else 'MISSED'
         table.add_row(
-            row.name,
-            row.unit,
-            *(f'{figure:.4g}' for figure in figures),
+            row.name if row.unit == '1' else f'{row.name} [{row.unit}]',
+            *(f'{figure:.3g}' for figure in figures),
             str(spread.count),
             asked,
             verdict,

@@ -20,6 +20,7 @@ from tablerunner.cli.info import info
 from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
 from tablerunner.cli.reproduce import reproduce
+from tablerunner.cli.stop_test import stop_test
 from tablerunner.cli.tune import tune
 from tablerunner.errors import BagError, ConfigError, TablerunnerError
 
@@ -45,6 +46,7 @@ def make_app() -> typer.Typer:
     app.command()(reproduce)
     app.command()(compare)
     app.command()(drive_test)
+    app.command()(stop_test)
     app.command()(explain_rule)
     app.command()(follow_test)
     app.add_typer(convert_app, name='convert')

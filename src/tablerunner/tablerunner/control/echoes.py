@@ -8,7 +8,7 @@ until it fires again, and a little longer because echoes drop out.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from tablerunner.types import NANOSECONDS, Refusal, UltrasonicSample, Vector, Ve
 _ARC_POINTS = 7
 _FUTURE_S = 0.1  # clocks of two machines may differ by this
 _CLOSING_M_S = 0.25  # several times what the noise of two readings makes of a thing at rest
+_LEAST_PACE_M_S = 0.12  # more than noise makes of a thing at rest over three readings
 _WALKING_M_S = 2.5  # faster than anybody walks in a room: another thing than before
 _COMPARE_S = 0.5  # readings farther apart are not compared
 _SIDE_RAD = math.radians(60.0)
@@ -58,7 +59,13 @@ class _Reading:
 
     stamp: int
     points: Vector  # (_ARC_POINTS, 2), dead-reckoned frame; empty: nothing there
-    nearing: bool  # it seemed to come nearer by itself
+    speed_m_s: float  # at which it came nearer by itself for sure; inf, -inf as in _coming_m_s
+    seen_m_s: float  # at which it came nearer by itself if it is no flat thing at a slant
+
+    @property
+    def nearing(self) -> bool:
+        """Whether it seemed to walk up to the robot."""
+        return _CLOSING_M_S < self.speed_m_s < math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +82,9 @@ class Heard:
         Whether it came nearer by itself, or has only just appeared.
     nearing : ndarray of bool, shape (n,)
         Whether it was measured to come nearer by itself, at walking pace.
+    paces_m_s : ndarray, shape (n,)
+        How fast it came nearer by itself over the last three readings; 0 when at rest. Something
+        flat at a slant ahead may seem to.
     beside : ndarray of bool, shape (n,)
         Whether a sensor heard it that looks to the side.
     sensors : ndarray of str, shape (n,)
@@ -84,6 +94,7 @@ class Heard:
     ages_s: Vector
     closing: NDArray[np.bool_]
     nearing: NDArray[np.bool_]
+    paces_m_s: Vector
     beside: NDArray[np.bool_]
     sensors: NDArray[np.str_]
 
@@ -119,6 +130,7 @@ class EchoMemory:
         self._last: dict[str, _Reading] = {}
         self._closing_until: dict[str, int] = {}
         self._nearing_until: dict[str, int] = {}
+        self._paces: dict[str, float] = {}
         # One row for each point of each echo that is remembered.
         self._points = np.empty((0, 2))  # in the dead-reckoned frame
         self._stamps = np.empty(0, dtype=np.int64)
@@ -140,19 +152,24 @@ class EchoMemory:
         # The echoes at hand are in the frame of now; at walking pace the few milliseconds between
         # firing and arrival do not matter, and the age is charged to whoever approaches.
         points = self._arc(sample)
-        speed = self._closing_m_s(sample, points)
-        closing = speed > _CLOSING_M_S
-        nearing = closing and speed < math.inf
+        coming = self._coming_m_s(sample, points)
+        speed = coming
+        if math.isfinite(coming):
+            speed = max(coming - self._passing_m_s(sample.sensor), 0.0)
+        number = self._names.index(sample.sensor)
+        seen_m_s = speed if self._beside[number] else coming
         last = self._last.get(sample.sensor)
+        reading = _Reading(sample.stamp, points, speed, seen_m_s)
         # Twice in a row: one step nearer may be the edge of another thing.
-        if nearing and last is not None and last.nearing:
+        if reading.nearing and last is not None and last.nearing:
             self._nearing_until[sample.sensor] = sample.stamp + NANOSECONDS // 2
-        if closing:
+        pace = math.nan if last is None else 0.5 * (seen_m_s + last.seen_m_s)
+        self._paces[sample.sensor] = pace if _LEAST_PACE_M_S < pace < math.inf else 0.0
+        if speed > _CLOSING_M_S:
             self._closing_until[sample.sensor] = sample.stamp + NANOSECONDS
         points = self._pose.transform(points)
         self._contradict(sample)
         count = len(points)
-        number = self._names.index(sample.sensor)
         self._points = np.concatenate([self._points, points])
         self._stamps = np.append(self._stamps, np.full(count, sample.stamp))
         self._sensors = np.append(self._sensors, np.full(count, number))
@@ -165,7 +182,7 @@ class EchoMemory:
         sharp = confirmed and sample.range_m <= _SHARP_M and not walking
         self._sharp = np.append(self._sharp, np.full(count, sharp))
         self._misses = np.append(self._misses, np.zeros(count, dtype=np.int64))
-        self._last[sample.sensor] = _Reading(sample.stamp, points, nearing)
+        self._last[sample.sensor] = replace(reading, points=points)
         return None
 
     def _contradict(self, sample: UltrasonicSample) -> None:
@@ -209,7 +226,7 @@ class EchoMemory:
         local = distance * np.column_stack([np.cos(angles), np.sin(angles)])
         return self.mounts[sample.sensor].transform(local)
 
-    def _closing_m_s(self, sample: UltrasonicSample, points: Vector) -> float:
+    def _coming_m_s(self, sample: UltrasonicSample, points: Vector) -> float:
         """Return how fast what is heard comes nearer beyond the robot's own motion [m/s].
 
         inf: nothing was heard there before, or another thing; -inf: nothing is heard.
@@ -231,11 +248,15 @@ class EchoMemory:
         speed = (before_m - now_m) / apart_s
         if speed > _WALKING_M_S:
             return math.inf
-        # A flat thing at rest that stands at a slant to the way seems to come nearer, too: to a
-        # side sensor as fast as the robot passes it, to those between the less.
-        passing = abs(self._motion.linear_m_s) * math.sin(mount.heading) ** 4
-        sweeping = abs(self._motion.angular_rad_s) * before_m
-        return max(speed - passing - sweeping, 0.0)
+        return speed - abs(self._motion.angular_rad_s) * before_m
+
+    def _passing_m_s(self, sensor: str) -> float:
+        """Return how fast a flat thing at rest may seem to come nearer.
+
+        One that stands at a slant to the way does: to a side sensor as fast as the robot passes
+        it, to those between the less.
+        """
+        return abs(self._motion.linear_m_s) * math.sin(self.mounts[sensor].heading) ** 4
 
     def move(self, motion: Velocity, dt: float) -> None:
         """Carry the echoes along while the robot drives with `motion` for `dt` [s]."""
@@ -281,11 +302,13 @@ class EchoMemory:
         newest = self._is_newest()
         closing = np.array([self._closing_until.get(name, 0) > now for name in self._names])
         nearing = np.array([self._nearing_until.get(name, 0) > now for name in self._names])
+        paces = np.array([self._paces.get(name, 0.0) for name in self._names])
         return Heard(
             self._pose.inverse().transform(self._points),
             np.maximum((now - self._stamps) / NANOSECONDS, 0.0),
             newest & closing[self._sensors],
             newest & nearing[self._sensors],
+            np.where(newest, paces[self._sensors], 0.0),
             self._beside[self._sensors],
             self._names_by_number[self._sensors],
         )

@@ -103,6 +103,7 @@ class FuzzyController:
     def _begin(self) -> None:
         self._arc = 0.0
         self._at_end = False
+        self._turning = False
         self._around = False
         self._seen_s = 0.0
         self._near_m = math.inf  # distance of what stands in the path
@@ -233,12 +234,20 @@ class FuzzyController:
         if len(path.points) > 1 and left > _LAST_M:
             step = self._keeper.step(pose, speed, self._explained)
             self._traces = () if step.trace is None else (step.trace,)
+            if self._turns(-step.heading_error_rad):
+                return self._turn(-step.heading_error_rad)
             return step.velocity
         end_x, end_y = path.end
         error = difference(math.atan2(end_y - pose.y, end_x - pose.x), pose.heading)
-        if abs(error) > ends.turn_in_place_above:
+        if self._turns(error):
             return self._turn(error)
         return Velocity(speed * math.cos(error), ends.turn_gain * error)
+
+    def _turns(self, error: float) -> bool:
+        """Return whether the robot turns before it drives: else it swings out beside the path."""
+        limit = self.ends.turn_until if self._turning else self.ends.turn_in_place_above
+        self._turning = abs(error) > limit
+        return self._turning
 
     def _turn(self, error: float) -> Velocity:
         rate = min(self.ends.turn_gain * abs(error), self.ends.turn_rate_in_place)

@@ -27,13 +27,16 @@ def make_planner(scenario: Scenario, config: PlannerConfig | None = None) -> Pla
 
 
 def make_surroundings(
-    scenario: Scenario, planner: Planner, config: SurroundingsConfig | None = None
+    scenario: Scenario,
+    planner: Planner,
+    config: SurroundingsConfig | None = None,
+    frames: tuple[str, ...] = FRAMES,
 ) -> Surroundings | None:
     """Return an empty memory of what is not on the map; None without the five sensors."""
     mounts = sensor_mounts(scenario.robot)
-    if any(frame not in mounts for frame in FRAMES):
+    if any(frame not in mounts for frame in frames):
         return None
-    return Surroundings(planner.floor, tuple(mounts[frame] for frame in FRAMES), config)
+    return Surroundings(planner.floor, tuple(mounts[frame] for frame in frames), config)
 
 
 def limits_within(limits: VelocityLimits, base: DriveLimits) -> VelocityLimits:

@@ -36,12 +36,14 @@ class Localisation:
     """How well the robot knows where it is.
 
     ``stamp`` is that of the newest pose (0: none yet); the standard deviations are the largest of
-    the position ellipse [m] and of the heading [rad].
+    the position ellipse [m] and of the heading [rad]. ``lost`` is what localisation says itself,
+    however certain its pose looks.
     """
 
     stamp: int = 0
     position_std_m: float = math.inf
     heading_std_rad: float = math.inf
+    lost: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +101,7 @@ class SafetyStop:
         self._clear_since: int | None = None
         self._reversed_m = 0.0
         self._cautious_m = 0.0
+        self._searched_m = 0.0
         self._emergency: str | None = None
 
     def configure(self, config: SafetyConfig, limits: VelocityLimits) -> None:
@@ -131,6 +134,7 @@ class SafetyStop:
         self._echoes.reset()
         self._now, self._last, self._stopped = 0, Velocity(), False
         self._clear_since = None
+        self._searched_m = 0.0
 
     def step(
         self,
@@ -166,6 +170,8 @@ class SafetyStop:
         elif self._last.linear_m_s > 0:
             self._reversed_m = 0.0
             self._cautious_m -= self._last.linear_m_s * dt
+        searching = self._searches(localisation)
+        self._searched_m += abs(self._last.linear_m_s) * dt if searching else -self._searched_m
         reasons = self._halts(now, command, command_stamp, localisation)
         if fault:
             reasons.insert(0, fault)
@@ -204,7 +210,15 @@ class SafetyStop:
                 reasons.append('pose too old')
             elif not localisation.position_std_m <= config.position_std_stop:
                 reasons.append('position too uncertain')
+            if self._searched_m >= config.search_distance:
+                lost = 'lost' if localisation.lost else 'heading not known'
+                reasons.append(f'{lost}: driven far enough so')
         return reasons
+
+    def _searches(self, localisation: Localisation) -> bool:
+        """Return whether the robot drives only to find out where it is or where it heads."""
+        known = localisation.heading_std_rad <= self.config.heading_std_slow
+        return localisation.lost or not known
 
     def _regulate(
         self, now: int, command: Velocity, localisation: Localisation, dt: float
@@ -224,13 +238,13 @@ class SafetyStop:
                 reasons.append(f'obstacle: {sensor}' if sensor else 'starting again after a stop')
         else:
             self._hold(now, math.inf)
-        uncertain = config.require_pose and not (
-            localisation.position_std_m <= config.position_std_slow
-            and localisation.heading_std_rad <= config.heading_std_slow
+        uncertain = config.require_pose and (
+            self._searches(localisation)
+            or not localisation.position_std_m <= config.position_std_slow
         )
         if uncertain and abs(wanted.linear_m_s) > config.uncertain_speed:
             top = min(top, config.uncertain_speed)
-            reasons.append('pose uncertain')
+            reasons.append('lost' if localisation.lost else 'pose uncertain')
         if wanted.linear_m_s < 0 and self._reversed_m >= config.reverse_distance:
             top = 0.0
             reasons.append('backed up far enough unseen')
@@ -301,6 +315,13 @@ class SafetyStop:
         speeds = largest_speed(
             ways - approach * heard.ages_s, config.delay, config.deceleration, approach
         )
+        # Who comes nearer, however slowly, may come on: the robot has to stand when he is there.
+        coming = (heard.paces_m_s > 0.0) & (heard.points[:, 0] > 0.0)
+        if coming.any():
+            pace = heard.paces_m_s[coming]
+            room = gaps[coming] - config.margin - pace * heard.ages_s[coming]
+            met = largest_speed(room, config.delay, config.deceleration, pace)
+            speeds[coming] = np.minimum(speeds[coming], met)
         beside = largest_speed(
             gaps * _SLANT - config.side_margin, config.delay, config.deceleration
         )

@@ -51,6 +51,13 @@ class SafetyConfig(Config):
     uncertain_speed: float = parameter(
         0.2, description='Largest speed while uncertain', unit='m/s', above=0.0, dynamic=True
     )
+    search_distance: float = parameter(
+        6.0,
+        description='Stop when driven farther while lost or without a heading',
+        unit='m',
+        low=0.0,
+        dynamic=True,
+    )
     delay: float = parameter(
         0.3,
         description='From a reading to the brakes biting: firing, transport, motor lag',

@@ -26,6 +26,8 @@ _FADE_EVERY_S = 1.0
 _ARC_M = 0.06  # half the thickness of the arc of an echo
 _BEFORE_M = 0.15  # so far before an echo nothing stands
 _SPACING_M = 0.1
+_ELSEWHERE = 0.15
+_BLUR_M = 0.08  # places are found wider than they are
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class SurroundingsConfig(Config):
         low=0.0,
     )
     passed: float = parameter(
-        0.35, description='What speaks against a place that sound has passed', low=0.0
+        0.5, description='What speaks against a place that sound has passed', low=0.0
     )
     silent: float = parameter(
         0.2,
@@ -58,9 +60,9 @@ class SurroundingsConfig(Config):
     enough: float = parameter(
         1.5, description='Whole echoes that make something of a place', above=0.0
     )
-    most: float = parameter(3.0, description='No more echoes than these are remembered', above=0.0)
+    most: float = parameter(4.0, description='No more echoes than these are remembered', above=0.0)
     fade_time: float = parameter(
-        30.0, description='Time constant of forgetting', unit='s', above=0.0
+        15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
     opening: float = parameter(
         0.48, description='Full opening of the cones', unit='rad', above=0.0, high=3.0
@@ -154,9 +156,11 @@ class Surroundings:
         known = floor.distance[rows, columns][arc]
         if not known.size or float(known.min()) <= config.explained:
             return
-        # Sound is strongest in the middle of the cone.
-        weight = min(1.0, config.sharp / max(distance, 1e-6)) * (1.0 - aside[arc] ** 2)
-        evidence[arc] = np.minimum(evidence[arc] + weight, config.most)
+        # Sound is strongest in the middle of the cone. At its edges an echo rather speaks against
+        # something: once is enough to explain it.
+        weight = min(1.0, config.sharp / max(distance, 1e-6))
+        share = (1.0 - aside[arc] ** 2) ** 2 - _ELSEWHERE
+        evidence[arc] = np.clip(evidence[arc] + weight * share, 0.0, config.most)
 
     @property
     def found(self) -> NDArray[np.bool_]:
@@ -174,7 +178,7 @@ class Surroundings:
                 self._floor = FloorMap(
                     floor.origin,
                     floor.resolution,
-                    np.minimum(floor.distance, away),
+                    np.minimum(floor.distance, np.where(found, 0.0, away + _BLUR_M)),
                     floor.outside,
                 )
         return self._floor

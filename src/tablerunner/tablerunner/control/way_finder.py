@@ -18,7 +18,7 @@ _LOOK_NS, _LOOK_AGAIN_NS = nanoseconds(0.25), nanoseconds(1.5)
 _AHEAD_M = 1.8
 _SPACE_M = 0.03
 _LONGER_M = 1.5
-_PATIENCE_S = 4.0
+_WALK_M_S = 0.4  # about the mean speed of a robot that gets on
 _MOVED_M = 0.3
 
 
@@ -83,8 +83,8 @@ class WayFinder:
     ) -> Path | None:
         """Return another way where something was found on this one; None: keep to it.
 
-        A way that is much longer is taken only when the thing does not go away: it may walk, and
-        near by the sensors tell better how wide it is.
+        For a way that is much longer it is first waited as long as it would take: the thing may
+        walk on, and near by the sensors tell better how wide it is.
 
         Parameters
         ----------
@@ -112,8 +112,11 @@ class WayFinder:
             self._barred_since = stamp
         self._look_at = stamp + _LOOK_AGAIN_NS
         other = self._round(pose, stop, discs)
-        patient = seconds(stamp - self._barred_since) < _PATIENCE_S
-        if other is None or (patient and other.length > left_m + _LONGER_M):
+        if other is None:
+            return None
+        longer = other.length - left_m
+        waited_s = seconds(stamp - self._barred_since)
+        if longer > _LONGER_M and waited_s < longer / _WALK_M_S:
             return None
         self._barred_since = None
         return other

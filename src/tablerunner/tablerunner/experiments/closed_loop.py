@@ -35,7 +35,7 @@ from tablerunner.control import (
     sensor_mounts,
 )
 from tablerunner.control.fuzzy.readings import UltrasonicRing
-from tablerunner.estimation import Localizer, LocalizerConfig, Outcome
+from tablerunner.estimation import Localizer, LocalizerConfig, LocalizerState, Outcome
 from tablerunner.geometry.pose import Pose2
 from tablerunner.messages.covariance import largest_deviations
 from tablerunner.odometry import Odometer, OdometerConfig
@@ -299,20 +299,23 @@ class ClosedLoop:
             self._believe(self.localizer.add_range(ranged))
 
     def _believe(self, outcome: Outcome) -> None:
-        estimate = outcome.estimate
+        estimate, self._fresh = outcome.estimate, False
         if estimate is None:
             return
         linear, angular = self.localizer.velocity()
         self._sample = OdometrySample(
             estimate.stamp, estimate.pose, linear, angular, estimate.pose_covariance
         )
-        self._fresh = False
 
     def _local(self) -> Localisation:
         sample = self._sample
         if sample is not None and not self._fresh:
             position, heading = largest_deviations(sample.pose_covariance)
-            self._localisation = Localisation(sample.stamp, position, heading)
+            lost = (
+                self.localizer.estimate is None
+                and self.localizer.status.state is LocalizerState.LOST
+            )
+            self._localisation = Localisation(sample.stamp, position, heading, lost)
             self._fresh = True
         return self._localisation
 

@@ -71,7 +71,7 @@ class Bound:
     low, high : float
         Limits, in the row's unit; infinite where there is none.
     of : str
-        Which figure of the spread is judged: ``mean`` or ``median``.
+        Which figure of the spread is judged: ``mean``, ``median``, ``low`` or ``high``.
     """
 
     low: float = float('-inf')
@@ -89,7 +89,7 @@ class Bound:
 
     def __str__(self) -> str:
         """Return the limits in few characters."""
-        name = '' if self.of == 'mean' else f'{self.of} '
+        name = {'mean': '', 'low': 'min ', 'high': 'max '}.get(self.of, f'{self.of} ')
         if np.isinf(self.low):
             return f'{name}<= {self.high:.3g}'
         if np.isinf(self.high):

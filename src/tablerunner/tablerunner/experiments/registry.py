@@ -11,19 +11,23 @@ from tablerunner.experiments.bae2022 import run_bae2022
 from tablerunner.experiments.camera_limits import run_limits
 from tablerunner.experiments.camera_run import run_camera
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
+from tablerunner.experiments.global_start import run_global_start
 from tablerunner.experiments.lias import run_lias
 from tablerunner.experiments.liu2023 import run_liu2023
 from tablerunner.experiments.lv import run_lv
 from tablerunner.experiments.nlos import run_nlos
 from tablerunner.experiments.pf_uiekf import run_pf_uiekf
 from tablerunner.experiments.sun2019 import run_sun2019
+from tablerunner.experiments.sun2019_track import run_sun2019_track
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
     {
         'lv': run_lv,
         'bae2022': run_bae2022,
         'sun2019': run_sun2019,
+        'sun2019_track': run_sun2019_track,
         'pf_uiekf': run_pf_uiekf,
+        'global_start': run_global_start,
         'liu2023': run_liu2023,
         'nlos': run_nlos,
         'ceiling_camera': run_camera,

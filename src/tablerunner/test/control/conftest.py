@@ -11,61 +11,45 @@ import pytest
 
 from tablerunner.control import (
     FollowerConfig,
-    Localisation,
     Mission,
     MissionConfig,
     MissionStatus,
     Planner,
     PurePursuit,
     SafetyConfig,
-    SafetyDecision,
-    SafetyStop,
     Situation,
-    VelocityLimits,
     home_of,
-    limits_within,
     make_planner,
-    sensor_mounts,
 )
+from tablerunner.experiments.crowd import crowd_hall
+from tablerunner.experiments.guarded_drive import GuardedDrive
 from tablerunner.geometry.pose import Pose2
-from tablerunner.scenario import Person, Scenario, Wall, load_scenario
-from tablerunner.simulation import Contact, Simulator, Truth
-from tablerunner.types import UltrasonicSample, Velocity
+from tablerunner.scenario import Scenario, load_scenario
+from tablerunner.types import Velocity
 
 SCENARIOS = Path(__file__).parents[3] / 'tablerunner_bringup' / 'scenarios'
 
 
-@dataclass
-class Loop:
+class Loop(GuardedDrive):
     """A simulated robot under a safety stop, driven by whatever asks for a velocity at 20 Hz."""
 
-    scenario: Scenario
-    seed: int
-    start: Pose2 | None = None
-    position_noise_m: float = 0.0
-    safety_config: SafetyConfig | None = None
-    simulator: Simulator = field(init=False)
-    safety: SafetyStop = field(init=False)
-    contacts: list[Contact] = field(default_factory=list)
-    decision: SafetyDecision | None = None
-    top_speed: float = 0.0
-
-    def __post_init__(self) -> None:
-        robot = self.scenario.robot
-        self.simulator = Simulator(self.scenario, self.seed, self.start)
-        self.limits = limits_within(VelocityLimits(), robot.limits)
-        config = self.safety_config or SafetyConfig()
-        self.safety = SafetyStop(
-            config.replace(footprint_radius=robot.footprint_radius),
-            self.limits,
-            sensor_mounts(robot),
-        )
-        self.random = np.random.default_rng(self.seed)
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        start: Pose2 | None = None,
+        position_noise_m: float = 0.0,
+        safety_config: SafetyConfig | None = None,
+    ) -> None:
+        super().__init__(scenario, seed, start, safety_config)
+        self.position_noise_m = position_noise_m
+        self.top_speed = 0.0
+        self.random = np.random.default_rng(seed)
         self.offset = np.zeros(3)
 
-    def pose(self) -> Pose2:
+    def believed(self) -> Pose2:
         """Return the true pose with an error that walks slowly."""
-        true = self.simulator.truth.pose
+        true = self.pose
         if self.position_noise_m:
             sigma = np.array([self.position_noise_m, self.position_noise_m, 0.03])
             # First-order Gauss-Markov, 1 s, at 20 Hz.
@@ -74,39 +58,17 @@ class Loop:
             true.x + self.offset[0], true.y + self.offset[1], true.heading + self.offset[2]
         )
 
-    def run(self, controller: Callable[[int, Pose2], Velocity | None], limit_s: float) -> bool:
+    def drive(self, controller: Callable[[int, Pose2], Velocity | None], limit_s: float) -> bool:
         """Drive until the controller returns None; return whether it did."""
-        simulator = self.simulator
-        command: Velocity | None = None
-        for step in range(int(limit_s * 100)):
-            for sample in simulator.step(command):
-                if isinstance(sample, Contact):
-                    self.contacts.append(sample)
-                elif isinstance(sample, UltrasonicSample):
-                    assert self.safety.add_reading(sample, simulator.now_ns) is None
-                elif isinstance(sample, Truth):
-                    self.top_speed = max(self.top_speed, abs(sample.linear_m_s))
+        for number in range(round(limit_s * 100)):
             command = None
-            if step % 5 == 4:
-                now = simulator.now_ns
-                wanted = controller(now, self.pose())
-                if wanted is None:
+            if number % 5 == 4:
+                command = controller(self.now, self.believed())
+                if command is None:
                     return True
-                truth = simulator.truth
-                self.decision = self.safety.step(
-                    now,
-                    wanted,
-                    now,
-                    Localisation(now, 0.05, 0.05),
-                    Velocity(truth.linear_m_s, truth.angular_rad_s),
-                )
-                command = self.decision.velocity
+            self.step(command)
+            self.top_speed = max(self.top_speed, abs(self.speed_m_s))
         return False
-
-    @property
-    def faults(self) -> list[Contact]:
-        """The touches that the robot has to answer for."""
-        return [contact for contact in self.contacts if contact.robot_at_fault]
 
 
 @dataclass
@@ -133,8 +95,8 @@ class Delivery:
             now,
             0.05,
             0.05,
-            decision is not None and decision.blocked and decision.velocity.linear_m_s == 0.0,
-            None if decision is None else decision.obstacle,
+            decision.blocked and decision.velocity.linear_m_s == 0.0,
+            decision.obstacle,
         )
         velocity, status = self.mission.step(situation)
         self.statuses.append(status)
@@ -169,28 +131,4 @@ def make_delivery() -> type[Delivery]:
 @pytest.fixture
 def hall() -> Callable[[int, float], Scenario]:
     """Return a maker of rooms of 10 m x 8 m, bare but for six people."""
-
-    def make(seed: int, yield_probability: float) -> Scenario:
-        random = np.random.default_rng(seed)
-        people = tuple(
-            Person(
-                name=f'person {number}',
-                route=tuple(
-                    (float(random.uniform(0.6, 9.4)), float(random.uniform(0.6, 7.4)))
-                    for _ in range(3)
-                ),
-                speed=float(random.uniform(0.4, 1.2)),
-                yield_probability=yield_probability,
-                start_share=float(random.uniform(0.0, 1.0)),
-            )
-            for number in range(6)
-        )
-        corners = ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0), (0.0, 8.0))
-        return Scenario(
-            name='hall',
-            walls=(Wall(name='wall', closed=True, points=corners),),
-            people=people,
-            start=(5.0, 4.0, float(random.uniform(-3.1, 3.1))),
-        )
-
-    return make
+    return crowd_hall

@@ -14,9 +14,11 @@ from tablerunner.control import (
     MissionConfig,
     PlannerConfig,
     SafetyConfig,
+    SurroundingsConfig,
     VelocityLimits,
     stopping_distance,
 )
+from tablerunner.control.fuzzy_controller import DetourConfig
 
 DOCS = Path(__file__).parents[4] / 'docs'
 
@@ -41,6 +43,8 @@ def expected_rows(cls: type[Config], prefix: str) -> list[str]:
         ('navigation.md', FollowerConfig, 'follower.'),
         ('navigation.md', MissionConfig, 'mission.'),
         ('navigation.md', BatteryConfig, 'battery.'),
+        ('navigation.md', SurroundingsConfig, 'surroundings.'),
+        ('fuzzy.md', DetourConfig, 'detour.'),
     ],
 )
 def test_parameter_table_is_that_of_the_code(page: str, cls: type[Config], prefix: str) -> None:

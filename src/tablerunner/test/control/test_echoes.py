@@ -166,11 +166,24 @@ def test_person_coming_nearer_is_told_from_a_wall(own: float) -> None:
         assert not heard.nearing[~newest].any()
 
 
+@pytest.mark.parametrize('own', [0.0, 0.3, 0.6])
+def test_pace_of_who_comes_nearer_slowly_is_measured(own: float) -> None:
+    """Too slow to be told from a slanted wall for sure, and yet he may meet the robot."""
+    for pace in (0.0, 0.2):
+        heard = approach(pace, Velocity(own, 0.0)).heard(S(1.8))
+        assert heard is not None
+        assert not heard.nearing.any()
+        newest = heard.ages_s <= heard.ages_s.min()
+        assert heard.paces_m_s[newest] == pytest.approx(pace, abs=0.01)
+        assert not heard.paces_m_s[~newest].any()
+
+
 def test_slanted_wall_beside_the_way_is_no_person() -> None:
     """At 30 degrees the wall comes nearer by half the robot's speed."""
     heard = approach(0.3, Velocity(0.6, 0.0), 'left').heard(S(1.8))
     assert heard is not None
     assert not heard.nearing.any()
+    assert not heard.paces_m_s.any()
     assert heard.beside.all()
 
 

@@ -147,3 +147,24 @@ def test_halts_and_refuses_what_cannot_be() -> None:
     drives = [controller.step(Pose2(1.0, 1.5, 0.0), DT) for _ in range(3)]
     assert drives[-1].velocity.angular_rad_s > 0.0  # turns to the heading
     assert controller.step(Pose2(1.0, 1.5, 1.0), DT).arrived
+
+
+@pytest.mark.parametrize('bearing', [-2.0, -1.4, 1.4, 3.1])
+def test_path_that_leads_aside_is_turned_to_first(bearing: float) -> None:
+    """Driving while it turns would swing the robot out beside its path, by up to 0.3 m."""
+    controller, pose = make(), Pose2(0.0, 0.0, bearing)
+    controller.follow(Path(np.array([[0.0, 0.0], [0.6, 0.0]])))
+    late, offs = [Velocity()], []  # the base is a step behind
+    for _ in range(200):
+        controller.hear(Readings((math.inf,) * 5))
+        step = controller.step(pose, 0.05)
+        offs.append(step.cross_track)
+        if step.arrived:
+            break
+        late.append(step.velocity)
+        velocity = late.pop(0)
+        turn = 0.05 * velocity.angular_rad_s
+        way = 0.05 * velocity.linear_m_s
+        pose = pose @ Pose2(way * math.cos(turn / 2), way * math.sin(turn / 2), turn)
+    assert step.arrived
+    assert max(offs) < 0.1

@@ -17,6 +17,7 @@ from tablerunner.control import (
     make_controller,
 )
 from tablerunner.control.fuzzy import Readings, TrackConfig
+from tablerunner.control.fuzzy_controller import DetourConfig
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import RobotGeometry
@@ -89,10 +90,11 @@ def test_fuzzy_explains_its_way_round_something() -> None:
     controller.explain(True)
     controller.follow(Path(np.array([[0.0, 0.0], [5.0, 0.0]])))
     bases = set()
-    for number in range(40):
-        near = number < 5
+    wait = round(DetourConfig().wait / 0.05)
+    for number in range(wait + 40):
+        near = number < wait + 5
         controller.hear(Readings((np.inf, np.inf, 0.5 if near else np.inf, np.inf, np.inf)))
-        controller.step(Pose2(1.0, 0.0, 1.2 if number > 5 else 0.0), 0.05)
+        controller.step(Pose2(1.0, 0.0, 0.0 if near else 1.2), 0.05)
         bases |= {trace.base for trace in controller.traces}
     assert {'lv_corner', 'lv_speed'} <= bases
 

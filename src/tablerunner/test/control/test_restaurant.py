@@ -46,7 +46,7 @@ def test_meal_arrives_and_the_robot_returns_without_touching_anybody(
     loop = make_loop(restaurant, 50 + number, position_noise_m=0.05)
     delivery = make_delivery(loop, restaurant_planner)
     delivery.mission.start((table_stop(restaurant, TABLES[number], 1.0),), return_home=True)
-    assert loop.run(delivery.step, 240.0), delivery.events
+    assert loop.drive(delivery.step, 240.0), delivery.events
     status = delivery.statuses[-1]
     assert status.state is MissionState.DONE, delivery.events
     assert status.reached == (TABLES[number], 'kitchen')

@@ -11,12 +11,17 @@ from tablerunner_ros.conversions.stamp import fill_stamp, stamp_from_message
 
 
 def velocity_from_message(
-    message: Twist | TwistStamped, source: str = 'cmd_vel'
+    message: Twist | TwistStamped, source: str = 'cmd_vel', frame: str = ''
 ) -> Velocity | Refusal:
-    """Return a command for a differential drive; what it cannot do (sideways) is refused."""
+    """Return a command for a differential drive; what it cannot do (sideways) is refused.
+
+    `frame` is that expected of a stamped command, which may leave its own empty; empty for any.
+    """
     stamp = 0
     if isinstance(message, TwistStamped):
         stamp = stamp_from_message(message.header.stamp)
+        if frame and message.header.frame_id not in ('', frame):
+            return Refusal(stamp, source, '', f'not in frame {frame}')
         message = message.twist
     linear, angular = message.linear.x, message.angular.z
     if not (math.isfinite(linear) and math.isfinite(angular)):

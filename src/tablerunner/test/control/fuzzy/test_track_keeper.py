@@ -78,14 +78,14 @@ def test_correction_grows_with_deviation_and_with_heading_error() -> None:
 
 
 def run(
-    path: Path, start: Pose2, drift: float = 0.0, steps: int = 3000
+    path: Path, start: Pose2, drift: float = 0.0, steps: int = 3000, speed: float = 0.4
 ) -> tuple[np.ndarray, float]:
-    """Return the deviations of a drive at 0.4 m/s, 20 steps a second, and the way left over."""
+    """Return the deviations of a drive, 20 steps a second, and the way left over."""
     keeper, limits, dt = TrackKeeper(TrackConfig(), WHEELS_M), VelocityLimits(), 0.05
     keeper.follow(path)
     pose, velocity, deviations = start, Velocity(), []
     for _ in range(steps):
-        step = keeper.step(pose, 0.4)
+        step = keeper.step(pose, speed)
         deviations.append(step.deviation_m)
         if step.left_over_m < 0.05:
             break
@@ -96,13 +96,19 @@ def run(
     return np.array(deviations), step.left_over_m
 
 
+@pytest.mark.parametrize('speed', [0.4, 0.6])
 @pytest.mark.parametrize('drift', [0.0, 0.03, -0.03])
-def test_square_of_sun_is_kept_within_five_centimetres_rms(drift: float) -> None:
-    """Issue 5 asks for 0.05 m RMS; also with wheels that pull to a side, by a drift in rad/s."""
-    deviations, left_over = run(SQUARE, Pose2(3.0, 3.0, math.pi / 2), drift)
+def test_square_of_sun_is_kept_within_five_centimetres_rms(drift: float, speed: float) -> None:
+    """Issue 5 asks for 0.05 m RMS; also with wheels that pull to a side, by a drift in rad/s.
+
+    At the corners, which are sharp, the robot turns before it drives on: a robot that drives on as
+    it turns is 0.23 m off at 0.6 m/s.
+    """
+    start = Pose2(3.0, 3.0, math.pi / 2)
+    deviations, left_over = run(SQUARE, start, drift, speed=speed)
     assert left_over < 0.05
     assert math.sqrt(np.mean(deviations**2)) < 0.05
-    assert np.abs(deviations).max() < 0.15  # at the corners, which are sharp
+    assert np.abs(deviations).max() < 0.1
 
 
 def test_robot_comes_back_from_anywhere_without_swinging_over() -> None:
