@@ -14,7 +14,7 @@ from geometry_msgs.msg import PoseArray, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState, MagneticField, Range
+from sensor_msgs.msg import CameraInfo, Image, Imu, JointState, MagneticField, Range
 from tf2_msgs.msg import TFMessage
 
 from sim_bridge.node import SimBridge
@@ -269,3 +269,29 @@ def test_node_bad_parameters_end_it_with_two(processes: Processes, room: Path) -
         assert process.wait() == 2
         assert words in process.output
         assert 'Traceback' not in process.output
+
+
+def test_bridge_camera_pictures_come_with_their_lens(probe: Probe, tmp_path: Path) -> None:
+    """Stamp and size agree; pictures leave at 10 Hz of simulated time, after their exposure."""
+    path = tmp_path / 'room.yaml'
+    camera = 'camera: {position: [3, 5, 3], width: 64, height: 48, focal: [40, 40], delay: 0.06}\n'
+    path.write_text(ROOM + camera + 'robot: {marker: {}}\n', encoding='utf-8')
+    images = probe.listen(Image, 'camera/image_raw')
+    infos = probe.listen(CameraInfo, 'camera/camera_info')
+    clocks = probe.listen(Clock, 'clock')
+    probe.host(
+        SimBridge,
+        parameter_overrides=[
+            Parameter('scenario', value=str(path)),
+            Parameter('real_time_factor', value=10.0),
+        ],
+    )
+    probe.wait_for(lambda: len(images) >= 5 and len(infos) >= 5, 'five pictures')
+    stamps = [seconds(image.header.stamp) for image in images]
+    assert np.diff(stamps) == pytest.approx(0.1)
+    assert stamps[-1] <= seconds(clocks[-1].clock) - 0.06 + 1e-6
+    for image, info in zip(images, infos, strict=False):
+        assert image.header == info.header
+        assert (image.width, image.height, len(image.data)) == (64, 48, 64 * 48 * 3)
+        assert (info.width, info.height, info.k[0]) == (64, 48, 40.0)
+        assert image.header.frame_id == 'ceiling_camera'
