@@ -46,6 +46,18 @@ class DetourConfig(Config):
         unit='s',
         low=0.0,
     )
+    shy: float = parameter(
+        0.35,
+        description='What is nearer to one side than this is turned away from',
+        unit='m',
+        above=0.0,
+    )
+    shy_turn: float = parameter(
+        1.0,
+        description='Turn rate away from what touches a slanting sensor',
+        unit='rad/s',
+        low=0.0,
+    )
     half_width: float = parameter(
         0.3, description='In the path is what is so near its middle', unit='m', above=0.0
     )
@@ -95,6 +107,7 @@ class FuzzyController:
         )
         self._path: Path | None = None
         self._readings: Readings | None = None
+        self._heard: Readings | None = None
         self._velocity = Velocity()
         self._explained = False
         self._traces: tuple[Trace, ...] = ()
@@ -164,6 +177,7 @@ class FuzzyController:
         if not pose.is_finite:
             raise ValueError('the pose is not finite')
         readings, self._readings = self._readings, None
+        self._heard = readings
         self._traces = ()
         end_x, end_y = path.end
         to_end = math.hypot(end_x - pose.x, end_y - pose.y)
@@ -236,12 +250,28 @@ class FuzzyController:
             self._traces = () if step.trace is None else (step.trace,)
             if self._turns(-step.heading_error_rad):
                 return self._turn(-step.heading_error_rad)
-            return step.velocity
+            return self._shy_of(step.velocity)
         end_x, end_y = path.end
         error = difference(math.atan2(end_y - pose.y, end_x - pose.x), pose.heading)
         if self._turns(error):
             return self._turn(error)
-        return Velocity(speed * math.cos(error), ends.turn_gain * error)
+        return self._shy_of(Velocity(speed * math.cos(error), ends.turn_gain * error))
+
+    def _shy_of(self, velocity: Velocity) -> Velocity:
+        """Return the velocity turned a little away from what is near on one side.
+
+        The path keeps clear of it, but the pose is not exact. Things on both sides cancel out.
+        """
+        detour, readings = self.detour, self._heard
+        if readings is None or velocity.linear_m_s <= 0.0:
+            return velocity
+        near = [
+            max(1.0 - distance / detour.shy, 0.0) if age <= 0.5 else 0.0
+            for distance, age in zip(readings.distances_m, readings.ages_s, strict=True)
+        ]
+        left, right = max(0.5 * near[0], near[1]), max(0.5 * near[4], near[3])
+        turn = velocity.angular_rad_s + detour.shy_turn * (right - left)
+        return Velocity(velocity.linear_m_s, turn)
 
     def _turns(self, error: float) -> bool:
         """Return whether the robot turns before it drives: else it swings out beside the path."""

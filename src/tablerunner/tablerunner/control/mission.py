@@ -215,7 +215,7 @@ class Mission:
         velocity: Velocity | None = None
         if self.is_busy and not self._paused:
             velocity = self._advance(situation, elapsed)
-        if velocity is None:
+        if velocity is None or self._ways.is_approached(situation.stamp):
             velocity = self.controller.halt(min(elapsed, _LONGEST_STEP_S))
         status = self.status
         self._events = []

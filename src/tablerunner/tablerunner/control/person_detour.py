@@ -11,7 +11,7 @@ from tablerunner.control.limits import VelocityLimits
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Velocity
 
-_BEGIN = 3  # steps in a row in which something is in the way
+_BEGIN_S = 0.22  # in the way for so long: a false echo lasts until its sensor fires again, 0.15 s
 _END_S = 0.5  # the way has been free for so long
 _MOVED_M = 1.0  # a target that has moved so far is another one
 
@@ -40,7 +40,7 @@ class PersonDetour:
     def reset(self) -> None:
         """Go round nothing."""
         self._target: tuple[float, float] | None = None
-        self._seen = 0
+        self._seen_s = 0.0
         self._free_s = 0.0
 
     def step(
@@ -67,8 +67,8 @@ class PersonDetour:
             Whether something is heard in the straight way to the target.
         """
         if self._target is None:
-            self._seen = self._seen + 1 if in_the_way else 0
-            if self._seen < _BEGIN:
+            self._seen_s = self._seen_s + dt if in_the_way else 0.0
+            if self._seen_s < _BEGIN_S:
                 return None
             self._begin(target)
         step = self._navigator.step(others, pose, dt)

@@ -28,6 +28,8 @@ _BEFORE_M = 0.15  # so far before an echo nothing stands
 _SPACING_M = 0.1
 _ELSEWHERE = 0.15
 _BLUR_M = 0.08  # places are found wider than they are
+_COMPARED_S = 0.4  # readings farther apart than this are not compared
+_RUNNING_M_S = 2.5  # nearer by more: another thing than before
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,15 @@ class SurroundingsConfig(Config):
     fade_time: float = parameter(
         15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
+    shy: float = parameter(
+        0.8, description='Who comes nearer than this by himself is waited for', unit='m', low=0.0
+    )
+    walking: float = parameter(
+        0.35, description='Coming nearer faster than this is walking', unit='m/s', above=0.0
+    )
+    yield_time: float = parameter(
+        0.8, description='Wait so long after somebody has come nearer', unit='s', low=0.0
+    )
     opening: float = parameter(
         0.48, description='Full opening of the cones', unit='rad', above=0.0, high=3.0
     )
@@ -99,6 +110,8 @@ class Surroundings:
         self._ages = [math.inf] * len(self._mounts)
         self._last: int | None = None
         self._fade_s = 0.0
+        self._before: list[tuple[int, float, Pose2] | None] = [None] * len(self._mounts)
+        self._approached: int | None = None
         self._floor: FloorMap | None = self._map  # None: to be made anew
 
     def hear(self, readings: Readings, pose: Pose2, stamp: int) -> None:
@@ -113,7 +126,30 @@ class Surroundings:
             is_new = age < self._ages[sensor] + 0.5 * dt
             self._ages[sensor] = age
             if is_new and age < 0.5 and not math.isnan(distance):
-                self._add(distance, pose @ self._mounts[sensor])
+                at = pose @ self._mounts[sensor]
+                if self._add(distance, at):
+                    self._compare(sensor, distance, at, stamp)
+                self._before[sensor] = stamp, distance, at
+
+    def _compare(self, sensor: int, distance: float, at: Pose2, stamp: int) -> None:
+        """Take note of what comes nearer by itself, faster than the robot moves towards it."""
+        config, before = self.config, self._before[sensor]
+        if before is None or distance > config.shy or before[1] == math.inf:
+            return
+        apart_s = seconds(stamp - before[0])
+        if not 0.0 < apart_s <= _COMPARED_S:
+            return
+        cos, sin = math.cos(at.heading), math.sin(at.heading)
+        own = (at.x - before[2].x) * cos + (at.y - before[2].y) * sin
+        speed = (before[1] - distance - own) / apart_s
+        if config.walking < speed < _RUNNING_M_S:
+            self._approached = stamp
+
+    def is_approached(self, stamp: int) -> bool:
+        """Return whether somebody who is not on the map has just come nearer by himself."""
+        if self._approached is None:
+            return False
+        return seconds(stamp - self._approached) < self.config.yield_time
 
     def _fade(self, dt: float) -> None:
         self._fade_s += dt
@@ -123,8 +159,8 @@ class Surroundings:
         self._fade_s = 0.0
         self._floor = None
 
-    def _add(self, distance: float, at: Pose2) -> None:
-        """Weigh one reading; `at` is the sensor in map."""
+    def _add(self, distance: float, at: Pose2) -> bool:
+        """Weigh one reading, `at` is the sensor in map; return whether the map lacks it."""
         config, floor = self.config, self._map
         far = min(distance, config.reach)
         row, column = floor.cell(at.x, at.y)
@@ -133,7 +169,7 @@ class Surroundings:
         columns = slice(max(column - half, 0), max(column + half + 1, 0))
         evidence = self._evidence[rows, columns]
         if not evidence.size:
-            return
+            return False
         xs = floor.origin[0] + floor.resolution * np.arange(
             columns.start, columns.start + evidence.shape[1]
         )
@@ -151,16 +187,17 @@ class Surroundings:
         evidence[before] = np.maximum(evidence[before] - against, 0.0)
         self._floor = None
         if distance > config.reach:
-            return
+            return False
         arc = in_cone & (np.abs(away - distance) <= _ARC_M)
         known = floor.distance[rows, columns][arc]
         if not known.size or float(known.min()) <= config.explained:
-            return
+            return False
         # Sound is strongest in the middle of the cone. At its edges an echo rather speaks against
         # something: once is enough to explain it.
         weight = min(1.0, config.sharp / max(distance, 1e-6))
         share = (1.0 - aside[arc] ** 2) ** 2 - _ELSEWHERE
         evidence[arc] = np.clip(evidence[arc] + weight * share, 0.0, config.most)
+        return True
 
     @property
     def found(self) -> NDArray[np.bool_]:

@@ -44,6 +44,10 @@ class WayFinder:
         if self.surroundings is not None:
             self.surroundings.hear(readings, pose, stamp)
 
+    def is_approached(self, stamp: int) -> bool:
+        """Return whether somebody has just come nearer by himself."""
+        return self.surroundings is not None and self.surroundings.is_approached(stamp)
+
     def begin(self) -> None:
         """Look along a new path from now on."""
         self._look_at = 0

@@ -225,6 +225,19 @@ def test_follower_takes_the_person_for_no_obstacle():
     assert steps[-1].velocity.linear_m_s == pytest.approx(0.4, abs=0.03)
 
 
+def test_follower_does_not_go_round_a_single_false_echo():
+    """It lasts 0.15 s, until its sensor fires again."""
+    follower = make()
+    states = set()
+    for number in range(1, 60):
+        heard = Readings((math.inf, math.inf, 0.4, math.inf, math.inf))
+        readings = heard if number % 20 < 3 else FREE
+        stamp = NANOSECONDS + nanoseconds(number * DT)
+        person = seen(Pose2(), (3.0, 0.0))
+        states.add(follower.step(stamp, DT, Pose2(), person, '', readings).state)
+    assert states == {FollowState.FOLLOWING}
+
+
 @pytest.mark.parametrize('aside', [-0.15, 0.05, 0.2])
 def test_follower_goes_round_what_stands_between(aside):
     """A pillar of 0.2 m radius 2 m ahead: round it without a touch, and to the set distance."""

@@ -324,3 +324,41 @@ def test_room_is_what_is_set_or_what_lies_between_the_anchors(room):
         assert poses[:, :2].min(axis=0) == pytest.approx(low, abs=0.01 * side.max())
         assert poses.mean(axis=0)[:2] == pytest.approx(np.add(low, high) / 2.0, abs=0.3)
         assert np.abs(poses[:, 2]).max() == pytest.approx(math.pi, abs=0.02)
+
+
+@ALL
+def test_odometry_errors_are_learned_from_the_poses_as_by_the_ekf(room, name):
+    """Two metres told, two and four centimetres more driven, and turned: scale and turn scale."""
+    start = Start(1, np.array([4.0, 3.0, 0.0]), np.eye(3) * 1e-6)
+    config = particles(least=2000)
+    found = []
+    for which in (name, 'ekf'):
+        estimator = ESTIMATORS[which](config, room.anchors, room.lever)
+        estimate, at = estimator.start(start), Pose2(4.0, 3.0, 0.0)
+        for k in range(20):
+            told = Motion(0.1, 0.1, 0.2)
+            at = advance(at, Motion(0.102, 0.1005, 0.2))
+            estimate = estimator.predict(estimate, told, k + 2)
+            if k % 5 == 4:
+                pose = PoseSample(k + 2, at, np.diag([1e-4, 1e-4, 1e-4]), 'camera/pose')
+                estimate, _ = estimator.update(estimate, pose)
+        found.append(estimate)
+    ours, expected = found
+    assert expected.mean[3] > 0.01  # of 0.02: there is something to learn
+    deviations = np.sqrt(np.diagonal(expected.covariance))[3:6]
+    # 2000 particles: a fiftieth of a deviation, some times over for the resampling.
+    assert np.abs(ours.mean[3:6] - expected.mean[3:6]).max() < 0.25 * deviations.max()
+    assert abs(ours.mean[3] - expected.mean[3]) < 0.3 * deviations[0]
+    assert np.sqrt(np.diagonal(ours.covariance))[3:6] == pytest.approx(deviations, rel=0.2)
+
+
+def test_each_stamp_has_random_numbers_of_its_own(room):
+    """The same range at another time draws other particles; at the same time the same."""
+    estimator = ESTIMATORS['pf'](CONFIG.filter, room.anchors, room.lever)
+    estimate = estimator.start(Start(1, np.array([4.0, 3.0, 0.8]), np.eye(3) * 0.01))
+    means = []
+    for stamp in (2, 2, 3):
+        sample = RangeSample(stamp, 'A0', 'tag', 0, 5.0, 0.01)
+        means.append(estimator.update(estimate, sample)[0].mean)
+    assert np.array_equal(means[0], means[1])
+    assert not np.array_equal(means[0], means[2])
