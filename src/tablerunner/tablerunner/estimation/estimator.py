@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from tablerunner.config import Config, parameter
 from tablerunner.estimation.particles.config import ParticleConfig
+from tablerunner.geometry.angles import wrap
 from tablerunner.odometry.motion import Motion, MotionNoise
 from tablerunner.types import (
     Estimate,
@@ -33,6 +36,13 @@ class Start:
     range_biases: Vector | None = None  # (anchors,)
     covariance: Matrix | None = None  # (3 + anchors, 3 + anchors), pose then biases
     anywhere: bool = False  # of a particle filter: nothing is known, the pose is the room's middle
+
+    @classmethod
+    def at(cls, sample: PoseSample) -> Start:
+        """Return the start at a pose with heading, at its stamp."""
+        pose = sample.pose
+        vector = np.array([pose.x, pose.y, wrap(pose.heading)])
+        return cls(sample.stamp, vector, sample.covariance)
 
 
 RANGE_SOURCE = 'uwb/ranges'

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from tablerunner.errors import CovarianceError
 from tablerunner.estimation.checks import check_odometry, check_pose, check_range
@@ -14,14 +12,15 @@ from tablerunner.estimation.estimator import RANGE_SOURCE, Estimator, Start
 from tablerunner.estimation.evidence import Evidence
 from tablerunner.estimation.fix_maker import FixMaker
 from tablerunner.estimation.localizer_config import LocalizerConfig
-from tablerunner.estimation.particles.anywhere import anywhere, missing
+from tablerunner.estimation.outcome import Outcome, refused
+from tablerunner.estimation.particles.anywhere import anywhere, is_known, missing
+from tablerunner.estimation.pose_start import PoseStart
 from tablerunner.estimation.registry import ESTIMATORS, STARTS_ANYWHERE
 from tablerunner.estimation.start_finder import StartFinder
 from tablerunner.estimation.status import Cause, LocalizerState, LocalizerStatus, tracking
 from tablerunner.estimation.timeline import Timeline
 from tablerunner.estimation.track import OdometryTrack, plausible
 from tablerunner.estimation.uwb_health import UwbHealth
-from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
 from tablerunner.stream import Order, StampOrder
 from tablerunner.types import (
@@ -38,16 +37,6 @@ from tablerunner.types import (
 from tablerunner.uwb.positioner import SOURCE as UWB_FIX_SOURCE
 
 ODOMETRY_SOURCE = 'odom'
-INITIAL_POSE_SOURCE = 'initialpose'
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What one input led to."""
-
-    estimate: Estimate | None = None  # newest belief, if this input changed it
-    innovations: tuple[Innovation, ...] = ()
-    refusals: tuple[Refusal, ...] = ()
 
 
 class Localizer:
@@ -70,7 +59,7 @@ class Localizer:
         self.set_anchors(anchors)
 
     def _clear(self) -> None:
-        self._pending = _initial_pose(self.config)
+        self._pending = self.config.given_pose
         self._track = OdometryTrack()
         self._fixes.reset()
         self._health.begin(0)
@@ -87,6 +76,7 @@ class Localizer:
         self._finder = StartFinder(
             self.config.alignment, self.config.filter, self._anchors, self._lever_arm
         )
+        self._poses = PoseStart(self.config.alignment, self.config.filter)
 
     @property
     def _lever_arm(self) -> tuple[float, float, float]:
@@ -151,16 +141,18 @@ class Localizer:
                 cause = Cause.CHOSEN
             unfused, withheld = self._health.unfused_s(now), self._health.withholds
             return tracking(cause, unfused, config.health.silence, withheld=withheld)
-        if not self._anchors:
+        if not (self._anchors or self._poses.words):
             return LocalizerStatus(LocalizerState.WAITING, 'no anchors yet')
         if not len(self._track):
             return LocalizerStatus(LocalizerState.WAITING, 'no odometry yet')
         words = self._finder.words
-        if self._timeline is not None:
+        if not self._finder.count and self._poses.words:
+            words = self._poses.words
+        elif self._timeline is not None:
             words = missing(self._timeline.newest, self.config.alignment)
         if self._lost:
             return LocalizerStatus(LocalizerState.LOST, f'lost; {words}')
-        searching = self._timeline is not None or self._finder.count
+        searching = self._timeline is not None or self._finder.count or self._poses.words
         state = LocalizerState.ALIGNING if searching else LocalizerState.WAITING
         return LocalizerStatus(state, words)
 
@@ -204,7 +196,7 @@ class Localizer:
         """Take odometry; the estimate moves on to its stamp."""
         reason = check_odometry(sample, self.config.max_speed, self.config.max_turn_rate)
         if reason:
-            return _refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
+            return refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
         order = self._order.judge(sample.stamp)
         restarted: tuple[Refusal, ...] = ()
         if order is Order.RESTARTED:
@@ -213,19 +205,21 @@ class Localizer:
             restarted = (Refusal(sample.stamp, ODOMETRY_SOURCE, '', order.value),)
         reason = self._odometry_fault(sample)
         if reason:
-            return _refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
+            return refused(sample.stamp, ODOMETRY_SOURCE, '', reason)
         if self._timeline is not None:
             self._timeline.add_odometry(sample)
             self._settle()
             return Outcome(self._timeline.newest)
         self._track.add(sample)
         self._track.trim(sample.stamp - nanoseconds(self.config.alignment.window))
-        if self._pending is not None and self._anchors:
+        if self._pending is not None:
             # Given before there was odometry: it holds for the first, whenever that may be.
             pending, self._pending = self._pending, None
-            self._begin(Start(sample.stamp, _vector(pending.pose), pending.covariance))
+            self._begin(Start.at(replace(pending, stamp=sample.stamp)))
             return Outcome(self.estimate, (), restarted)
-        if self.config.estimator in STARTS_ANYWHERE and self._anchors:
+        if self.config.estimator in STARTS_ANYWHERE and is_known(
+            self.config.filter, self._anchors
+        ):
             self._begin(anywhere(self.config.filter, self._anchors, sample.stamp))
         return Outcome(None, (), restarted)
 
@@ -235,7 +229,7 @@ class Localizer:
         reason = reason or self._place_fault(sample.stamp)
         if reason:
             self._health.hear(sample, False, self._track)
-            return _refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
+            return refused(sample.stamp, RANGE_SOURCE, sample.anchor_id, reason)
         if self._timeline is not None:
             if not self._open:
                 self._health.compare(sample, self._track, self._timeline)
@@ -267,12 +261,28 @@ class Localizer:
         if sample.source == UWB_FIX_SOURCE:
             sample = replace(sample, point=self._lever_arm[:2])
         reason = self._switch_fault() or check_pose(sample) or self._place_fault(sample.stamp)
-        if not reason and self._timeline is None:
-            reason = 'start not known yet'
         if reason:
             self._health.hear(sample, False, self._track)
-            return _refused(sample.stamp, sample.source, '', reason)
+            return refused(sample.stamp, sample.source, '', reason)
+        if self._timeline is None or self._open:
+            found = self._start_by(sample)
+            if found is not None:
+                return found
         return self._correct(sample, sample.source, '')
+
+    def _start_by(self, sample: PoseSample) -> Outcome | None:
+        """Begin where a few poses agree; None: particles that began anywhere can use this one."""
+        reason = self._too_early(sample.stamp)
+        found = self._poses.add(sample, self._track) if not reason else None
+        if isinstance(found, Start):
+            self._begin(found)
+            self._health.hear(sample, True, self._track)
+            return Outcome(self.estimate)
+        if isinstance(found, Refusal):
+            if self._open:
+                return None
+            reason = found.reason
+        return refused(sample.stamp, sample.source, '', reason) if reason else Outcome()
 
     def add_magnetic(self, sample: MagneticSample) -> Outcome:
         """Take a magnetic field: a heading, where it is plausible and the start is known."""
@@ -285,10 +295,10 @@ class Localizer:
         if not reason and self._timeline is None:
             reason = 'start not known yet'
         if reason or self._timeline is None:
-            return _refused(sample.stamp, heading.source, '', reason)
+            return refused(sample.stamp, heading.source, '', reason)
         innovation = self._timeline.add(heading)
         if innovation is None:
-            return _refused(sample.stamp, heading.source, '', 'repeated')
+            return refused(sample.stamp, heading.source, '', 'repeated')
         return self._corrected(innovation)
 
     def set_pose(self, sample: PoseSample) -> Outcome:
@@ -299,15 +309,13 @@ class Localizer:
         if not reason and not len(self._track):
             self._pending = sample
             return Outcome()
-        reason = reason or self._place_fault(sample.stamp)
-        if not reason and sample.stamp < self._track.oldest_stamp:
-            reason = 'older than the history'
+        reason = reason or self._place_fault(sample.stamp) or self._too_early(sample.stamp)
         if reason:
-            return _refused(sample.stamp, sample.source, '', reason)
+            return refused(sample.stamp, sample.source, '', reason)
         try:
-            self._begin(Start(sample.stamp, _vector(sample.pose), sample.covariance))
+            self._begin(Start.at(sample))
         except CovarianceError as error:
-            return _refused(sample.stamp, sample.source, '', str(error))
+            return refused(sample.stamp, sample.source, '', str(error))
         return Outcome(self.estimate)
 
     # -- inside -----------------------------------------------------------------------------------
@@ -319,7 +327,7 @@ class Localizer:
         withhold = self._health.withholds and source in (RANGE_SOURCE, UWB_FIX_SOURCE)
         innovation = self._timeline.add(sample, withhold=withhold)
         if innovation is None:
-            return _refused(sample.stamp, source, key, 'repeated')
+            return refused(sample.stamp, source, key, 'repeated')
         self._watch(innovation)
         if withhold:
             innovation = innovation._replace(accepted=False, reason=Cause.DISAGREE.value)
@@ -372,6 +380,10 @@ class Localizer:
             return 'older than the history'
         return ''
 
+    def _too_early(self, stamp: int) -> str:
+        """Return why no estimate can begin at this stamp; '' if one can."""
+        return 'older than the history' if stamp < self._track.oldest_stamp else ''
+
     def _odometry_fault(self, sample: OdometrySample) -> str:
         track, config = self._track, self.config
         if not len(track):
@@ -420,19 +432,3 @@ class Localizer:
             self._timeline = None
             self._lost = True
             self._forget_start()
-
-
-def _initial_pose(config: LocalizerConfig) -> PoseSample | None:
-    if not config.initial_pose:
-        return None
-    x, y, heading = config.initial_pose
-    covariance = np.diag(np.square(config.initial_pose_std))
-    return PoseSample(0, Pose2(x, y, heading), covariance, INITIAL_POSE_SOURCE)
-
-
-def _vector(pose: Pose2) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    return np.array([pose.x, pose.y, wrap(pose.heading)])
-
-
-def _refused(stamp: int, source: str, key: str, reason: str) -> Outcome:
-    return Outcome(None, (), (Refusal(stamp, source, key, reason),))

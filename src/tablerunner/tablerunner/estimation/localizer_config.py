@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from tablerunner.config import Config, parameter
 from tablerunner.errors import ConfigError
 from tablerunner.estimation.alignment import AlignmentConfig
@@ -11,7 +13,11 @@ from tablerunner.estimation.compass import CompassConfig
 from tablerunner.estimation.estimator import EstimatorConfig
 from tablerunner.estimation.registry import ESTIMATORS
 from tablerunner.estimation.uwb_health import UwbHealthConfig
+from tablerunner.geometry.pose import Pose2
+from tablerunner.types import PoseSample
 from tablerunner.uwb import PositionerConfig
+
+INITIAL_POSE_SOURCE = 'initialpose'
 
 
 def _patient_positioner() -> PositionerConfig:
@@ -111,6 +117,15 @@ class LocalizerConfig(Config):
     alignment: AlignmentConfig = parameter(
         factory=AlignmentConfig, description='How the start is found'
     )
+
+    @property
+    def given_pose(self) -> PoseSample | None:
+        """The pose of `initial_pose`, without a stamp; None where it is to be found."""
+        if not self.initial_pose:
+            return None
+        x, y, heading = self.initial_pose
+        covariance = np.diag(np.square(self.initial_pose_std))
+        return PoseSample(0, Pose2(x, y, heading), covariance, INITIAL_POSE_SOURCE)
 
     def check(self) -> None:
         """Check the lengths of the lists."""

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from tablerunner.estimation.estimator import Estimator, Measurement, Start
-from tablerunner.estimation.localizer import Localizer, Outcome
+from tablerunner.estimation.localizer import Localizer
 from tablerunner.estimation.localizer_config import LocalizerConfig
+from tablerunner.estimation.outcome import Outcome
 from tablerunner.estimation.timeline import Timeline
 from tablerunner.estimation.track import OdometryTrack
 from tablerunner.odometry.motion import Motion

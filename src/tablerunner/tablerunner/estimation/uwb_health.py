@@ -261,8 +261,8 @@ class UwbHealth:
         events = [event for event in self._events if event.heard >= fresh]
         if not events:
             return Cause.SILENT
-        if self._fault is not None:
-            return self._fault
+        if self._fault is not None and any(event.key for event in events):
+            return self._fault  # what ranges told, while there are any
         blocked = all(event.blocked for event in events)
         judged = [event.accepted for event in events if event.accepted is not None]
         if judged and not any(judged):

@@ -29,6 +29,11 @@ def room_of(config: EstimatorConfig, anchors: Sequence[Anchor]) -> Room:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
+def is_known(config: EstimatorConfig, anchors: Sequence[Anchor]) -> bool:
+    """Whether there is a room to begin anywhere in: one that is set, or anchors."""
+    return bool(config.particles.room) or bool(anchors)
+
+
 def anywhere(config: EstimatorConfig, anchors: Sequence[Anchor], stamp: int) -> Start:
     """Return the start that knows nothing: the middle of the room, and how far it may be off."""
     low_x, low_y, high_x, high_y = room_of(config, anchors)
