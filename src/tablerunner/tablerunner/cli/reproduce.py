@@ -19,7 +19,9 @@ def reproduce(
     ] = '',
     seeds: Annotated[
         Optional[int],
-        typer.Option(metavar='N', min=1, help='How many seeds to run; 20, of pf_uiekf 100.'),
+        typer.Option(
+            metavar='N', min=1, help='How many seeds to run; 20, of pf_uiekf and camera_start 100.'
+        ),
     ] = None,
     first_seed: Annotated[
         int, typer.Option('--seed', metavar='N', min=0, help='The first of the seeds.')

@@ -25,7 +25,7 @@ from tablerunner.experiments.seeds import run_seeds
 from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import AnchorPlace, RobotGeometry, Scenario, SensorErrors, Wall
-from tablerunner.types import Matrix, RangeSample
+from tablerunner.types import Matrix, OdometrySample, PoseSample, RangeSample
 
 FAR_M = 5.0
 """Within how much driving the pose is to be found."""
@@ -116,8 +116,8 @@ def one_run(seed: int, names: Sequence[str] = ESTIMATED, carried_off: bool = Tru
         fusing = Localizer(replace(config.localizer, estimator=name), config.ranger.anchors)
         after, place, found = 0, Pose2(), []
         for part, samples in zip(parts, sensed, strict=True):
-            beliefs, place, last = _follow(fusing, samples, after, place)
-            found.append(_judge(part, beliefs, after))
+            beliefs, place, last = follow(fusing, samples, after, place)
+            found.append(judge(part, beliefs, after))
             after = last + 100_000_000
         result[name] = (found[0], found[-1])
     return result
@@ -165,34 +165,38 @@ Believed = tuple[int, Matrix | None]
 """A stamp of the drive [ns], and the pose that was believed then, if any."""
 
 
-def _follow(
-    fusing: Localizer, samples: Sequence[Sensed], after: int, place: Pose2
+def follow(
+    fusing: Localizer, samples: Sequence[Sensed | PoseSample], after: int, place: Pose2
 ) -> tuple[list[Believed], Pose2, int]:
     """Give samples to the localiser, later by `after`, odometry going on from `place`.
 
-    Ranges wait for the odometry that follows them: a localiser puts them in their place, to the
-    last bit, and has half the work.
+    Ranges and poses wait for the odometry that follows them: a localiser puts them in their
+    place, to the last bit, and has half the work.
     """
     beliefs: list[Believed] = []
     newest, last = place, after
-    waiting: list[RangeSample] = []
+    waiting: list[RangeSample | PoseSample] = []
     for sample in samples:
         stamp = sample.stamp + after
         last = max(last, stamp)
-        if isinstance(sample, RangeSample):
+        if not isinstance(sample, OdometrySample):
             waiting.append(replace(sample, stamp=stamp))
             continue
         newest = place @ sample.pose
         fusing.add_odometry(replace(sample, stamp=stamp, pose=newest))
         for held in waiting:
-            fusing.add_range(held)
+            if isinstance(held, RangeSample):
+                fusing.add_range(held)
+            else:
+                fusing.add_pose(held)
         waiting.clear()
         estimate = fusing.estimate
         beliefs.append((stamp, None if estimate is None else estimate.mean[:3]))
     return beliefs, newest, last
 
 
-def _judge(part: Drive, beliefs: Sequence[Believed], after: int) -> Found:
+def judge(part: Drive, beliefs: Sequence[Believed], after: int, far: float = FAR_M) -> Found:
+    """Return how a part went, from what was believed; errors after `far` [m] of driving."""
     steps = np.linalg.norm(np.diff(part.poses[:, :2], axis=0), axis=1)
     driven_at = np.concatenate([[0.0], np.cumsum(steps)])
     turned = np.unwrap(part.poses[:, 2])
@@ -209,7 +213,7 @@ def _judge(part: Drive, beliefs: Sequence[Believed], after: int) -> Found:
             found = math.inf
         elif math.isinf(found):
             found = driven
-        if driven <= FAR_M:
+        if driven <= far:
             place, heading = off, turn
     return Found(found, place, heading)
 

@@ -10,6 +10,7 @@ from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
 from tablerunner.experiments.camera_limits import run_limits
 from tablerunner.experiments.camera_run import run_camera
+from tablerunner.experiments.camera_start import run_camera_start
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
 from tablerunner.experiments.global_start import run_global_start
 from tablerunner.experiments.lias import run_lias
@@ -28,6 +29,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'sun2019_track': run_sun2019_track,
         'pf_uiekf': run_pf_uiekf,
         'global_start': run_global_start,
+        'camera_start': run_camera_start,
         'liu2023': run_liu2023,
         'nlos': run_nlos,
         'ceiling_camera': run_camera,
@@ -36,8 +38,8 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
 )
 
 USUAL_SEEDS = 20
-MORE_SEEDS: Mapping[str, int] = MappingProxyType({'pf_uiekf': 100})
-"""Where a seed is a short run, as many as the paper has."""
+MORE_SEEDS: Mapping[str, int] = MappingProxyType({'pf_uiekf': 100, 'camera_start': 100})
+"""Where a seed is a short run: as many as the paper has, or as are asked."""
 
 RECORDED: Mapping[str, Callable[[Path, Progress], Outcome]] = MappingProxyType({'lias': run_lias})
 """Those that need recordings of others, from the folder that they are given."""

@@ -10,7 +10,7 @@ from tablerunner.experiments.global_start import (
     NEAR_M,
     NEAR_RAD,
     Found,
-    _judge,
+    judge,
     one_run,
     part_of,
     room_of,
@@ -47,12 +47,12 @@ def test_judge_asks_for_a_pose_that_stays_right():
         if 10 <= k < 20:
             pose[2] += math.pi
         beliefs.append((int(stamp), None if k < 3 else pose))
-    found = _judge(part, beliefs, 0)
+    found = judge(part, beliefs, 0)
     steps = np.linalg.norm(np.diff(part.poses[:, :2], axis=0), axis=1)
     driven = np.concatenate([[0.0], np.cumsum(steps)])
     expected = driven[int(np.searchsorted(part.stamps, stamps[20]))]
     assert found.driven == pytest.approx(expected, abs=0.02)
     assert found.place < 0.01
-    never = _judge(part, [(stamp, None) for stamp, _ in beliefs], 0)
+    never = judge(part, [(stamp, None) for stamp, _ in beliefs], 0)
     assert not never.in_time
     assert Found(5.1, 0.0, 0.0).in_time is False
