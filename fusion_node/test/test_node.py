@@ -254,6 +254,24 @@ def test_fusion_pose_of_the_camera_is_used(probe: Probe) -> None:
     assert back.pose.x > START.x + 0.05
 
 
+def test_fusion_unknown_start_is_found_by_the_camera(probe: Probe) -> None:
+    """Three poses that agree, standing: tracking, and map to odom with the next odometry."""
+    fusion = Fusion(probe, start=None, use_ranges=False)
+    probe.speak(PoseWithCovarianceStamped, 'camera/pose')
+    probe.connected('camera/pose')
+    for count in (1, 2, 3):
+        fusion.drive(0.0, 0.0, 5, ranges=False)
+        assert fusion.poses == []
+        sample = PoseSample(fusion.stamp, START, np.eye(3) * 1e-4)
+        probe.publish('camera/pose', pose_to_message(sample, 'map'))
+        fusion.taken('camera/pose', count)
+    probe.wait_for(lambda: fusion.poses, 'a pose')
+    probe.wait_diagnostic('fusion_node', 'state', 'tracking')
+    fusion.drive(0.5, 0.0, 20, ranges=False)
+    assert fusion.error()[0] < 0.02
+    probe.wait_for(lambda: fusion.tf, 'map to odom')
+
+
 def test_fusion_stream_that_begins_again_resets_and_is_reported(fusion: Fusion) -> None:
     """A bag that starts anew: the old estimate is dropped, all begins at the start again."""
     fusion.drive(0.5, 0.2, 100)

@@ -161,10 +161,11 @@ def draw(figure: Any, runs: Sequence[Run]) -> None:
     for axes, part, words in zip(
         figure.subplots(1, 2, sharey=True), (0, 1), ('from anywhere', 'carried off'), strict=True
     ):
-        for name in ESTIMATED:
+        # One may lie on the other.
+        for name, line in zip(ESTIMATED, ('-', '--'), strict=True):
             driven = np.sort([run[name][part].driven for run in runs])
             share = 100.0 * np.arange(1, len(driven) + 1) / len(driven)
-            axes.step(driven, share, where='post', label=name)
+            axes.step(driven, share, where='post', label=name, linestyle=line)
         axes.set_xlim(0.0, 2.0)
         axes.set_ylim(0.0, 101.0)
         axes.set_xlabel('driven [m]')
