@@ -194,6 +194,33 @@ def test_dead_reckoning_is_started_by_poses_and_refuses_them_after(room):
     assert localizer.status.cause is Cause.CHOSEN
 
 
+@pytest.mark.parametrize('estimator', sorted(ESTIMATORS))
+def test_a_given_pose_begins_without_anchors_and_odometry_carries_it(room, estimator):
+    drive = room.drive(1, seconds=2.0)
+    localizer = Localizer(CONFIG.replace(estimator=estimator, initial_pose=(4.0, 3.0, 0.8)))
+    outcomes = feed(localizer, in_time(drive.odometry, drive.ranges[:4]))
+    assert set(reasons(outcomes)) == {'unknown anchor'}
+    assert localizer.status.trusted
+    assert localizer.status.cause in (Cause.SILENT, Cause.CHOSEN)
+    assert off(localizer, drive.truth)[0] < 0.02
+
+
+@pytest.mark.parametrize('estimator', ['pf', 'pf_uiekf'])
+def test_one_false_marker_draws_no_particles(room, estimator):
+    """Particles all over the room; the first pose is of something else, three right ones not."""
+    drive = room.drive(1, seconds=1.0)
+    false, *right = seen(drive)[:4]
+    false = replace(false, pose=Pose2(9.0, 7.0, -2.0))
+    localizer = Localizer(CONFIG.replace(estimator=estimator), room.anchors)
+    samples = in_time(drive.odometry, [false, *right])
+    for sample in samples[: samples.index(right[-1])]:
+        feed(localizer, [sample])
+        assert not localizer.status.trusted
+    feed(localizer, samples[samples.index(right[-1]) :])
+    assert localizer.status.trusted
+    assert off(localizer, drive.truth)[0] < 0.03
+
+
 @pytest.mark.parametrize('estimator', ['ekf', 'pf_uiekf'])
 def test_a_carried_robot_is_found_again_by_the_camera(room, estimator):
     """No anchors: lost within the window, found three poses later, whatever the seed."""

@@ -7,7 +7,7 @@ import pytest
 
 from tablerunner.estimation.alignment import AlignmentConfig
 from tablerunner.estimation.estimator import EstimatorConfig, Start
-from tablerunner.estimation.pose_start import LONGEST_GAP_S, NO_HEADING, OVERTAKEN, PoseStart
+from tablerunner.estimation.pose_start import NO_HEADING, OVERTAKEN, PoseStart
 from tablerunner.estimation.track import OdometryTrack
 from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
@@ -124,7 +124,7 @@ def test_places_that_are_known_badly_start_nothing():
 def test_poses_too_far_apart_do_not_count_together():
     odometry, start = track(), finder()
     for k in range(4):
-        sample = pose(odometry, k * (LONGEST_GAP_S + 0.1))
+        sample = pose(odometry, 2.1 * k)
         assert start.add(sample, odometry) is None
         assert start.words == '1 of 3 poses that agree'
 
