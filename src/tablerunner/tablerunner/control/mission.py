@@ -215,7 +215,7 @@ class Mission:
         velocity: Velocity | None = None
         if self.is_busy and not self._paused:
             velocity = self._advance(situation, elapsed)
-        if velocity is None or self._ways.is_approached(situation.stamp):
+        if velocity is None:
             velocity = self.controller.halt(min(elapsed, _LONGEST_STEP_S))
         status = self.status
         self._events = []
@@ -263,6 +263,8 @@ class Mission:
             self._miss(f'not reached within {self.config.stop_limit:.0f} s')
             return None
         if leg.path is None and not self._plan(situation, pose, stop):
+            return None
+        if self._ways.is_approached(situation.stamp):
             return None
         self._look_ahead(situation, pose, stop)
         drive = self.controller.step(pose, dt)
