@@ -5,6 +5,8 @@ SHELL := bash
 PYTHON ?= python3
 # Further arguments for the command behind a target: make test ARGS='-k safety', make demo ARGS=--help
 ARGS ?=
+# Tests that run side by side: one that computes and two that mostly wait keep two cores busy.
+WORKERS ?= 3
 
 SETUP := $(PYTHON) tools/bootstrap
 ENV := . ./env.sh
@@ -25,7 +27,8 @@ demo: setup ## Deliver meals in the simulated restaurant; results in out/demo/
 
 test: setup ## Run all tests
 	@mkdir -p out
-	@$(ENV) && python3 -m pytest --junitxml=out/test.xml $(ARGS)
+	@$(ENV) && python3 -m pytest $$(python3 -c 'import xdist' 2> /dev/null && echo --numprocesses=$(WORKERS)) \
+	  --junitxml=out/test.xml $(ARGS)
 
 lint: setup ## Check style, types and spelling
 	@$(ENV) && ruff check . && ruff format --check . && mypy && codespell && echo 'lint: nothing found'

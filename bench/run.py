@@ -10,6 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import camera
 import drive_rooms
 import filter_step
 import fuzzy
@@ -17,6 +18,7 @@ import latency
 import memory
 import monte_carlo
 import offline
+import particles
 import processor
 import protocols
 import safety
@@ -37,6 +39,8 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'fuzzy': fuzzy.measure,
     'protocols': protocols.measure,
     'drive_rooms': drive_rooms.measure,
+    'particles': particles.measure,
+    'camera': camera.measure,
 }
 WITH_BAR = {'solvers', 'monte_carlo'}
 """Those that show a bar of their own, with which a spinner would fight for the line."""

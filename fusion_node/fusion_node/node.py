@@ -21,9 +21,10 @@ from tablerunner.estimation import (
     Outcome,
     SmootherConfig,
 )
-from tablerunner.types import Refusal
+from tablerunner.types import NANOSECONDS, Refusal
 from tablerunner_interfaces.msg import Innovation as InnovationMessage
 from tablerunner_interfaces.msg import UwbAnchorArray, UwbRange
+from tablerunner_ros.clocks import steady_ns
 from tablerunner_ros.conversions.anchors import anchors_from_message
 from tablerunner_ros.conversions.imu import magnetic_from_message
 from tablerunner_ros.conversions.innovation import innovation_to_message, refusal_to_message
@@ -38,6 +39,7 @@ from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
 
 ODOM, RANGES, ANCHORS, START = 'odom', 'uwb/ranges', 'uwb/anchors', 'initialpose'
 MAGNETIC = 'imu/mag'
+_STATE_PERIOD_NS = NANOSECONDS // 5
 FIX = 'uwb/pose'  # also made of ranges inside, for estimators that take positions
 
 
@@ -64,6 +66,7 @@ class FusionNode(Node):
         self._output.configure(
             declare_config(self, SmootherConfig, on_change=self._output.configure)
         )
+        self._known, self._told_at = False, 0
         self._innovations = self.create_publisher(
             InnovationMessage, 'innovations', qos_for('innovations')
         )
@@ -109,7 +112,7 @@ class FusionNode(Node):
         place = self._localizer.map_to_odom
         if place is not None and outcome.estimate is not None:
             self._output.transform(outcome.estimate, place, self._localizer.starts)
-        self._output.state(self._localizer.status)
+        self._tell()
         self._count(outcome, ODOM, sample.stamp)
 
     def _on_sample(
@@ -124,7 +127,7 @@ class FusionNode(Node):
             return
         outcome = take(sample)
         self._publish(outcome)
-        self._output.state(self._localizer.status)
+        self._tell()
         self._count(outcome, source, sample.stamp)
 
     def _start(self, source: str, message: PoseWithCovarianceStamped) -> str:
@@ -135,7 +138,7 @@ class FusionNode(Node):
             return refusal.reason
         outcome = self._localizer.set_pose(sample)
         self._publish(outcome)
-        self._output.state(self._localizer.status)
+        self._tell()
         self._count(outcome, source, sample.stamp)
         if outcome.refusals:
             return outcome.refusals[0].reason
@@ -194,6 +197,16 @@ class FusionNode(Node):
             self._refuse(refusal)
         if not outcome.refusals:
             self._diagnostics.take(source, stamp)
+
+    def _tell(self) -> None:
+        """Publish the state at once when the pose is lost or found, else now and then.
+
+        To work it out takes about as long as to take a range.
+        """
+        known, now = self._localizer.estimate is not None, steady_ns()
+        if known is not self._known or now - self._told_at >= _STATE_PERIOD_NS:
+            self._known, self._told_at = known, now
+            self._output.state(self._localizer.status)
 
     def _configure(self, config: LocalizerConfig) -> None:
         self._localizer.configure(config)

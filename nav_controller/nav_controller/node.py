@@ -16,6 +16,7 @@ from nav_controller.convert import (
     feedback_from_status,
 )
 from nav_controller.deliver_server import DeliverServer
+from nav_controller.follow_mode import FollowMode
 from nav_controller.outputs import Outputs
 from nav_controller.params import NavNodeConfig
 from nav_controller.requests import Requests
@@ -71,6 +72,7 @@ class NavNode(Node):
         self._diagnostics.describe(self._describe)
         self._deliver = DeliverServer(self, self._begin, self._dispatcher.cancel)
         self._requests = Requests(self, self._dispatcher)
+        self._follow = FollowMode(self, config, scenario, self._diagnostics, self._dispatcher)
         for type_, topic, callback in (
             (PoseStamped, GOAL, self._on_goal),
             (PathMessage, WAYPOINTS, self._on_waypoints),
@@ -106,6 +108,7 @@ class NavNode(Node):
     def _go(self, source: str, stops: tuple[Destination, ...]) -> None:
         """Drive to places for a topic; that replaces what came by topic, never a delivery."""
         try:
+            self._follow.require_idle()
             self._dispatcher.go(stops, now_ns(self))
         except (MissionError, PlanningError) as error:
             self._refuse(source, str(error))
@@ -118,6 +121,7 @@ class NavNode(Node):
         stamp = now_ns(self)
         try:
             stops = destinations_from_goal(goal, self._scenario, self._config.map_frame)
+            self._follow.require_idle()
             if not stops:
                 raise MissionError('a delivery needs at least one stop')
             delivery = Delivery(name, self._mission.tour_of(stops, goal.return_home))
@@ -135,10 +139,12 @@ class NavNode(Node):
     def _on_timer(self) -> None:
         stamp = now_ns(self)
         situation = self._senses.situation(stamp)
-        self._mission.hear(self._senses.readings(stamp))
+        readings = self._senses.readings(stamp)
+        self._mission.hear(readings)
         step = self._dispatcher.step(situation)
         self._status = step.status
-        self._outputs.drive(step.velocity, stamp)
+        velocity = self._follow.step(stamp, step.velocity, readings, situation.blocked)
+        self._outputs.drive(velocity, stamp)
         self._outputs.plan(step.status.path, stamp)
         self._outputs.explain(self._parts.controller.traces, stamp)
         for event in step.events:
@@ -160,6 +166,7 @@ class NavNode(Node):
         self._config = config
         self._parts.configure(config)
         self._battery.config = config.battery
+        self._follow.configure(config)
 
     def _describe(self, report: Report) -> None:
         status, dispatcher, stamp = self._status, self._dispatcher, now_ns(self)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nav_controller.follow_params import FollowConfig, PersonLocatorConfig, check_follow
 from tablerunner.config import Config, parameter
 from tablerunner.control import (
     CONTROLLERS,
@@ -30,6 +31,7 @@ class NavNodeConfig(Config):
 
     scenario: str = parameter(description='Scenario file: walls, tables, robot')
     map_frame: str = parameter('map', description='Frame of goals and poses')
+    odom_frame: str = parameter('odom', description='Frame of odom, for following a person')
     base_frame: str = parameter('base_link', description='Frame of the robot')
     control_rate: float = parameter(
         20.0, description='Velocities per second', unit='Hz', low=5.0, high=100.0
@@ -80,6 +82,11 @@ class NavNodeConfig(Config):
     battery: BatteryConfig = parameter(
         factory=BatteryConfig, description='When the battery counts as low'
     )
+    follow: FollowConfig = parameter(factory=FollowConfig, description='How a person is followed')
+    person: PersonLocatorConfig = parameter(
+        factory=PersonLocatorConfig,
+        description='Whose tag, and from which anchors; none: those of the scenario',
+    )
     queue_file: str = parameter(
         '', description='File that keeps the deliveries over a restart; empty: none does'
     )
@@ -98,6 +105,7 @@ class NavNodeConfig(Config):
             raise ConfigError(
                 'reactive.min_speed', self.reactive.min_speed, 'at most limits.max_speed'
             )
+        check_follow(self.follow)
 
     @property
     def controllers(self) -> ControllerSettings:

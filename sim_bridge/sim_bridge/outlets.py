@@ -43,19 +43,23 @@ class Outlets:
     node : rclpy.node.Node
     config : BridgeConfig
     scenario : Scenario
-        Its robot's ultrasonic sensors have a topic each, ``ultrasonic/NAME``; a camera's pictures
-        come with its lens as it was measured, not as it is.
+        Its robot's ultrasonic sensors have a topic each, ``ultrasonic/NAME``; what its robot's tag
+        ranges is on ``uwb/exchanges``, what people's tags range on ``person/exchanges``; a
+        camera's pictures come with its lens as it was measured, not as it is.
     """
 
     def __init__(self, node: Node, config: BridgeConfig, scenario: Scenario) -> None:
         self._config = config
+        self._tag_id = scenario.tag_id
 
         def topic(type_: type[Any], name: str) -> Callable[[Any], None]:
             return node.create_publisher(type_, name, qos_for(name)).publish
 
         self._clock = topic(Clock, 'clock')
         self._people = topic(PoseArray, 'people')
-        exchanges = topic(UwbExchange, 'uwb/exchanges')
+        self._exchanges = topic(UwbExchange, 'uwb/exchanges')
+        if scenario.robot.anchors:
+            self._worn = topic(UwbExchange, 'person/exchanges')
         wheels = topic(JointState, 'joint_states')
         imu = topic(Imu, 'imu/data')
         magnetic = topic(MagneticField, 'imu/mag')
@@ -68,7 +72,7 @@ class Outlets:
         joints = (config.left_joint, config.right_joint)
         frames = (config.map_frame, config.base_frame)
         self._by_type: dict[type[Any], Callable[[Any], None]] = {
-            ExchangeSample: lambda s: exchanges(exchange_to_message(s, config.tag_frame)),
+            ExchangeSample: self._publish_exchange,
             WheelSample: lambda s: wheels(wheels_to_message(s, *joints)),
             ImuSample: lambda s: imu(imu_to_message(s, config.imu_frame)),
             MagneticSample: lambda s: magnetic(magnetic_to_message(s, config.imu_frame)),
@@ -102,6 +106,12 @@ class Outlets:
             publish = self._by_type.get(type(sample))
             if publish is not None:
                 publish(sample)
+
+    def _publish_exchange(self, sample: ExchangeSample) -> None:
+        if sample.tag_id == self._tag_id:
+            self._exchanges(exchange_to_message(sample, self._config.tag_frame))
+        else:
+            self._worn(exchange_to_message(sample, sample.tag_id))
 
     def publish_people(self, now_ns: int, people: Iterable[PersonState]) -> None:
         """Publish where everybody is."""

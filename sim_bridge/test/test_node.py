@@ -14,7 +14,7 @@ from geometry_msgs.msg import PoseArray, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState, MagneticField, Range
+from sensor_msgs.msg import CameraInfo, Image, Imu, JointState, MagneticField, Range
 from tf2_msgs.msg import TFMessage
 
 from sim_bridge.node import SimBridge
@@ -32,7 +32,13 @@ anchors:
   - {id: A2, position: [9.9, 9.9, 2.25]}
   - {id: A3, position: [0.1, 9.9, 2.25]}
 people:
-  - {name: guest, route: [[2.0, 8.0], [8.0, 8.0]]}
+  - {name: guest, route: [[2.0, 8.0], [8.0, 8.0]], tag: {id: guest_tag}}
+robot:
+  anchors:
+    - {id: R0, position: [0.17, 0.17, 1.0]}
+    - {id: R1, position: [-0.17, 0.17, 1.0]}
+    - {id: R2, position: [-0.17, -0.17, 1.0]}
+    - {id: R3, position: [0.17, -0.17, 1.0]}
 start: [3.0, 5.0, 0.0]
 sensors:
   uwb: {loss_probability: 0.0}
@@ -46,6 +52,7 @@ STREAMS: dict[str, tuple[type[Any], float]] = {
     'imu/data': (Imu, 100.0),
     'imu/mag': (MagneticField, 20.0),
     'uwb/exchanges': (UwbExchange, 40.0),
+    'person/exchanges': (UwbExchange, 40.0),
     'people': (PoseArray, 10.0),
     **{f'ultrasonic/{name}': (Range, 1.0 / 0.15) for name in NAMES},
 }
@@ -94,6 +101,9 @@ def test_node_topics_come_at_the_rates_of_the_contract(
     frames = {topic: heard[topic][0].header.frame_id for topic in STREAMS if topic != 'clock'}
     assert frames['imu/data'] == frames['imu/mag'] == 'imu_link'
     assert frames['uwb/exchanges'] == 'uwb_tag'
+    assert frames['person/exchanges'] == 'guest_tag'
+    assert {message.tag_id for message in heard['uwb/exchanges']} == {'tag'}
+    assert {message.tag_id for message in heard['person/exchanges']} == {'guest_tag'}
     assert frames['ground_truth'] == frames['people'] == 'map'
     for name in NAMES:
         assert frames[f'ultrasonic/{name}'] == f'ultrasonic_{name}'
@@ -259,3 +269,29 @@ def test_node_bad_parameters_end_it_with_two(processes: Processes, room: Path) -
         assert process.wait() == 2
         assert words in process.output
         assert 'Traceback' not in process.output
+
+
+def test_bridge_camera_pictures_come_with_their_lens(probe: Probe, tmp_path: Path) -> None:
+    """Stamp and size agree; pictures leave at 10 Hz of simulated time, after their exposure."""
+    path = tmp_path / 'room.yaml'
+    camera = 'camera: {position: [3, 5, 3], width: 64, height: 48, focal: [40, 40], delay: 0.06}\n'
+    path.write_text(ROOM + camera + 'robot: {marker: {}}\n', encoding='utf-8')
+    images = probe.listen(Image, 'camera/image_raw')
+    infos = probe.listen(CameraInfo, 'camera/camera_info')
+    clocks = probe.listen(Clock, 'clock')
+    probe.host(
+        SimBridge,
+        parameter_overrides=[
+            Parameter('scenario', value=str(path)),
+            Parameter('real_time_factor', value=10.0),
+        ],
+    )
+    probe.wait_for(lambda: len(images) >= 5 and len(infos) >= 5, 'five pictures')
+    stamps = [seconds(image.header.stamp) for image in images]
+    assert np.diff(stamps) == pytest.approx(0.1)
+    assert stamps[-1] <= seconds(clocks[-1].clock) - 0.06 + 1e-6
+    for image, info in zip(images, infos, strict=False):
+        assert image.header == info.header
+        assert (image.width, image.height, len(image.data)) == (64, 48, 64 * 48 * 3)
+        assert (info.width, info.height, info.k[0]) == (64, 48, 40.0)
+        assert image.header.frame_id == 'ceiling_camera'

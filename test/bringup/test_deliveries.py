@@ -9,7 +9,9 @@ import pytest
 import yaml
 
 from tablerunner.bags.reader import BagReader
-from tablerunner_bringup.nodes import NODES
+from tablerunner.scenario import Scenario
+from tablerunner_bringup.nodes import nodes_of
+from tablerunner_bringup.run_options import RunOptions
 
 pytestmark = pytest.mark.slow
 
@@ -51,7 +53,7 @@ def test_launch_delivery_reaches_table_and_home(start, room, domain):
         assert all(counts[name] > 0 for name in RECORDED)
         duration_s = (bag.end - bag.start) * 1e-9
         assert counts['/ground_truth'] == pytest.approx(50 * duration_s, rel=0.1)
-    for spec in NODES:
+    for spec in nodes_of(RunOptions(), Scenario(name='room')):
         assert (run.folder / 'logs' / f'{spec.name}.log').exists()
         text = (run.folder / 'params' / f'{spec.name}.yaml').read_text(encoding='utf-8')
         assert yaml.safe_load(text)[f'/**/{spec.name}']['ros__parameters']

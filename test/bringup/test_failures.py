@@ -10,10 +10,15 @@ import pytest
 from nav_msgs.msg import Odometry
 
 from tablerunner.bags.reader import BagReader
+from tablerunner.scenario import Scenario
 from tablerunner.types import NANOSECONDS
-from tablerunner_bringup.nodes import NODES
+from tablerunner_bringup.nodes import nodes_of
+from tablerunner_bringup.run_options import RunOptions
 
 pytestmark = pytest.mark.slow
+
+RUNNING = nodes_of(RunOptions(), Scenario(name='room'))
+"""The nodes of a run in a room without a camera or a person with a tag."""
 
 STANDING = 0.02
 """Below this [m/s] the robot stands."""
@@ -24,7 +29,7 @@ def stamp(message: Odometry) -> int:
     return message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
 
 
-@pytest.mark.parametrize('name', [spec.name for spec in NODES])
+@pytest.mark.parametrize('name', [spec.name for spec in RUNNING])
 def test_run_node_killed_robot_stands_and_run_says_why(driving, probe, name):
     """Within a second of measurement time the robot stands; the run fails and names the node."""
     run, truth = driving
@@ -51,7 +56,7 @@ def test_run_node_killed_robot_stands_and_run_says_why(driving, probe, name):
 def test_run_interrupted_leaves_no_process(driving):
     """Ctrl-C ends every process; the delivery is not done, which the exit code says."""
     run, _ = driving
-    assert len(run.family()) == len(NODES) + 1
+    assert len(run.family()) == len(RUNNING) + 1
     run.process.send(signal.SIGINT)
     assert run.wait_end(30.0) == 1
     assert 'SIGINT' in run.process.output

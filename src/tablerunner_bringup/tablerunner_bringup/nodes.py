@@ -49,6 +49,18 @@ NODES: tuple[NodeSpec, ...] = (
 )
 """All nodes; they may be started in any order, and side by side."""
 
+PERSON_DRIVER = NodeSpec(
+    'person_driver',
+    'uwb_driver',
+    'uwb_driver',
+    parameters.person_driver,
+    remap=tuple(
+        (f'uwb/{name}', f'person/{name}') for name in ('exchanges', 'ranges', 'anchors', 'pose')
+    ),
+    needed=lambda scenario: bool(scenario.robot.anchors),
+)
+"""uwb_driver once more, for the anchors that a robot carries and the tags that people wear."""
+
 COMMANDING = 'nav_controller'
 """The node whose end takes the command away: the safety stop behind it goes to zero on silence."""
 
@@ -57,6 +69,6 @@ def nodes_of(options: RunOptions, scenario: Scenario) -> tuple[NodeSpec, ...]:
     """Return the nodes of a run: on a real robot none that simulates, and what the room needs."""
     return tuple(
         spec
-        for spec in NODES
+        for spec in (*NODES, PERSON_DRIVER)
         if (options.simulated or not spec.simulation_only) and spec.needed(scenario)
     )

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from tablerunner.scenario import Scenario
+from tablerunner.scenario import PersonTag, Scenario
 from tablerunner_bringup.run_options import RunOptions
 
 Parameters = dict[str, Any]
@@ -27,6 +27,26 @@ def uwb_driver(scenario: Scenario, options: RunOptions) -> Parameters:
         ],
         'tag_height': float(scenario.robot.tag_position[2]),
     }
+
+
+def person_driver(scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return where the anchors sit on the robot, and how high the person's tag hangs."""
+    tag = worn_tag(scenario)
+    return {
+        **_common(options),
+        'map_frame': 'base_link',
+        'tag_frame': 'person_tag' if tag is None else tag.id,
+        'anchor_ids': [anchor.id for anchor in scenario.robot.anchors],
+        'anchor_positions': [
+            float(number) for anchor in scenario.robot.anchors for number in anchor.position
+        ],
+        **({} if tag is None else {'tag_height': float(tag.position[2])}),
+    }
+
+
+def worn_tag(scenario: Scenario) -> PersonTag | None:
+    """Return the tag of who is to be followed: the first who wears one."""
+    return next((person.tag for person in scenario.people if person.tag is not None), None)
 
 
 def odom_node(scenario: Scenario, options: RunOptions) -> Parameters:
@@ -77,9 +97,13 @@ def fusion_node(scenario: Scenario, options: RunOptions) -> Parameters:
     return parameters
 
 
-def nav_controller(_scenario: Scenario, options: RunOptions) -> Parameters:
-    """Return the map, which the node reads from the scenario itself."""
-    return {**_common(options), 'scenario': _path(options)}
+def nav_controller(scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return the map, which the node reads from the scenario itself, and whom it may follow."""
+    parameters: Parameters = {**_common(options), 'scenario': _path(options)}
+    tag = worn_tag(scenario)
+    if tag is not None:
+        parameters['person'] = {'tag_id': tag.id, 'tag_height': float(tag.position[2])}
+    return parameters
 
 
 def safety_stop(_scenario: Scenario, options: RunOptions) -> Parameters:

@@ -35,6 +35,10 @@ class Arrival(NamedTuple):
     data: bytes
 
 
+ON_REQUEST = 'debug_image'
+"""Last part of the name of a topic that ceiling_camera fills only for who listens."""
+
+
 @dataclass
 class Selection:
     """Which topics to record.
@@ -44,7 +48,8 @@ class Selection:
     patterns : collection of str
         Full topic names, ``*`` and ``?`` allowed; empty: every topic.
     hidden : bool
-        Whether topics with a part that begins with an underscore are taken when not named.
+        Whether topics with a part that begins with an underscore are taken when not named, and
+        pictures that are drawn only because somebody listens.
     """
 
     patterns: Collection[str] = ()
@@ -54,7 +59,9 @@ class Selection:
         """Return whether a topic is to be recorded."""
         if self.patterns:
             return any(fnmatchcase(topic, pattern) for pattern in self.patterns)
-        return self.hidden or not any(part.startswith('_') for part in topic.split('/'))
+        parts = topic.split('/')
+        drawn = parts[-1] == ON_REQUEST
+        return self.hidden or not (drawn or any(part.startswith('_') for part in parts))
 
 
 @dataclass

@@ -33,7 +33,7 @@ from tablerunner_bringup.supervisor import StopLimits, Supervisor
 RECORDER = 'recorder'
 _TICK_S = 0.02
 _UP_LIMIT_S = 60.0
-_STAND_LIMIT_S = 1.5
+_STAND_LIMIT_S = 3.0
 _LIMITS = StopLimits(interrupt_s=5.0, terminate_s=2.0)
 
 

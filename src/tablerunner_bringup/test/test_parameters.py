@@ -98,6 +98,36 @@ def test_parameters_real_robot_uses_system_time(odd):
     assert not any(spec.parameters(scenario, real)['use_sim_time'] for spec in specs)
 
 
+CARRIED = """
+people: [{name: host, route: [[5, 5]], tag: {id: host_tag, position: [-0.25, 0, 1]}}]
+"""
+RING = (
+    'anchors: [{id: R0, position: [0, 1, 1]}, {id: R1, position: [1, 0, 1]}, '
+    '{id: R2, position: [0, 0, 1]}]'
+)
+
+
+def test_parameters_robot_with_anchors_has_a_driver_for_them(tmp_path):
+    """A second uwb_driver under names of its own, which knows only the anchors on the robot."""
+    path = tmp_path / 'carried.yaml'
+    path.write_text(ODD.replace('robot: {', 'robot: {' + RING + ', ') + CARRIED, encoding='utf-8')
+    scenario, options = load_scenario(path), RunOptions(scenario=str(path))
+    spec = nodes_of(options, scenario)[-1]
+    assert (spec.name, spec.executable) == ('person_driver', 'uwb_driver')
+    assert ('uwb/ranges', 'person/ranges') in spec.remap
+    told = spec.parameters(scenario, options)
+    assert told['anchor_ids'] == ['R0', 'R1', 'R2']
+    assert told['map_frame'] == 'base_link'
+    known = {field.name for cls in CONFIGS['uwb_driver'] for field in fields_of(cls)}
+    assert set(told) - {'use_sim_time'} <= known
+    build(RangerConfig, Document({n: told[n] for n in ('anchor_ids', 'anchor_positions')}))
+    person = parameters.nav_controller(scenario, options)['person']
+    assert person == {'tag_id': 'host_tag', 'tag_height': 1.0}
+    assert all(
+        item.name != 'person_driver' for item in nodes_of(options, load_scenario(RESTAURANT))
+    )
+
+
 def test_parameters_empty_list_is_left_out(tmp_path):
     """ROS cannot tell the type of an empty list in a file."""
     file = tmp_path / 'node.yaml'

@@ -95,7 +95,12 @@ def test_offered_profiles_words_and_numbers_mean_the_same():
 @pytest.mark.parametrize(
     ('selection', 'taken', 'left'),
     [
-        (Selection(), ['/odom', '/uwb/ranges'], ['/deliver/_action/feedback']),
+        (
+            Selection(),
+            ['/odom', '/camera/image_raw'],
+            ['/deliver/_action/feedback', '/camera/debug_image'],
+        ),
+        (Selection(('/camera/*',)), ['/camera/debug_image'], ['/odom']),
         (Selection(hidden=True), ['/deliver/_action/feedback'], []),
         (Selection(['/uwb/*']), ['/uwb/ranges'], ['/odom', '/uwb']),
         (Selection(['/deliver/_action/*']), ['/deliver/_action/status'], ['/odom']),

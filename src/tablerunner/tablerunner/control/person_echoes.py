@@ -58,12 +58,17 @@ def without_person(
 
 
 def in_the_way(
-    readings: Readings, mounts: tuple[Pose2, ...], target: tuple[float, float], notice: float
+    readings: Readings,
+    mounts: tuple[Pose2, ...],
+    target: tuple[float, float],
+    notice: float,
+    surely: bool = True,
 ) -> bool:
     """Return whether what the three sensors ahead hear stands between base_link and a target.
 
-    An echo may come from anywhere on an arc; it is in the way when the whole arc is near the
-    straight line to the target, or when it is so near that any turn would meet it.
+    An echo may come from anywhere on an arc. It is surely in the way when the whole arc is near
+    the straight line to the target, and may be when a part of it is; and whatever is so near that
+    any turn would meet it is.
 
     Parameters
     ----------
@@ -74,6 +79,8 @@ def in_the_way(
         In base_link [m].
     notice : float
         What is farther from the sensor is not looked at [m].
+    surely : bool
+        Whether it has to be for sure.
     """
     away = max(math.hypot(*target), 1e-6)
     along = target[0] / away, target[1] / away
@@ -87,9 +94,10 @@ def in_the_way(
             (mount.x + distance * math.cos(course), mount.y + distance * math.sin(course))
             for course in courses
         ]
-        if all(
+        near = [
             x * along[0] + y * along[1] > 0.0 and abs(y * along[0] - x * along[1]) <= _HALF_WIDTH_M
             for x, y in points
-        ):
+        ]
+        if all(near) if surely else any(near):
             return True
     return False

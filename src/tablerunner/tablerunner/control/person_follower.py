@@ -13,10 +13,10 @@ from enum import Enum
 import numpy as np
 
 from tablerunner.control.follow_config import FollowConfig, least_distance
-from tablerunner.control.fuzzy.reactive import ReactiveConfig, ReactiveController
 from tablerunner.control.fuzzy.readings import Readings
 from tablerunner.control.limits import VelocityLimits
 from tablerunner.control.look_around import LookAround
+from tablerunner.control.person_detour import PersonDetour
 from tablerunner.control.person_echoes import in_the_way, without_person
 from tablerunner.control.person_trail import PersonTrail
 from tablerunner.control.safety_config import SafetyConfig
@@ -111,9 +111,7 @@ class PersonFollower:
             )
         self.config = config
         self.limits = limits.replace(max_speed=min(limits.max_speed, config.speed))
-        reactive = ReactiveConfig()
-        reactive = reactive.replace(min_speed=min(reactive.min_speed, self.limits.max_speed))
-        self._reactive = ReactiveController(reactive, self.limits)
+        self._detour = PersonDetour(self.limits, self._mounts)
 
     @property
     def state(self) -> FollowState:
@@ -144,6 +142,7 @@ class PersonFollower:
         self._look = LookAround(self.config.look_every)
         self._trail.reset()
         self._on_trail = False
+        self._detour.reset()
         self._last: tuple[PersonSample, Pose2] | None = None  # where the person was last seen
 
     def step(
@@ -198,7 +197,7 @@ class PersonFollower:
             return self._out(Velocity(), dt, person)
         wanted = self._behind(person, error, walks)
         if self._state is not FollowState.STANDING:
-            wanted, around = self._drive(pose, place, person, wanted.linear_m_s, readings)
+            wanted, around = self._drive(pose, place, person, wanted.linear_m_s, dt, readings)
             if around:
                 self._state = FollowState.ROUND
         look = self._look_if_held(stamp, blocked and self._state is not FollowState.STANDING)
@@ -244,7 +243,7 @@ class PersonFollower:
             self._reason = f'{self._reason} for {limit:g} s'
             return self._out(Velocity(), dt, None)
         self._state = FollowState.LOST
-        wanted = self._seek(pose, readings)
+        wanted = self._seek(pose, dt, readings)
         if wanted is not None:
             look = self._look_if_held(stamp, blocked)
             return self._out(look or wanted, dt, None)
@@ -253,7 +252,7 @@ class PersonFollower:
             look = self._look.step(stamp, self._velocity.linear_m_s == 0.0)
         return self._out(look or Velocity(), dt, None)
 
-    def _seek(self, pose: Pose2, readings: Readings | None) -> Velocity | None:
+    def _seek(self, pose: Pose2, dt: float, readings: Readings | None) -> Velocity | None:
         """Return the velocity to where the person was last seen; None: near enough to it."""
         if self._last is None or self.config.seek_speed == 0.0:
             return None
@@ -264,7 +263,7 @@ class PersonFollower:
             self._last = None
             return None
         speed = min(self.config.gain * error, self.config.seek_speed, self.limits.max_speed)
-        return self._drive(pose, place, None, speed, readings)[0]
+        return self._drive(pose, place, None, speed, dt, readings)[0]
 
     def _look_if_held(self, stamp: int, held: bool) -> Velocity | None:
         """Return what to drive to see past what has held the robot up for a while."""
@@ -302,6 +301,7 @@ class PersonFollower:
             self._state = FollowState.STANDING
             bearing = math.atan2(person.position[1], person.position[0])
             turn = config.turn_gain * bearing if abs(bearing) > config.face_within else 0.0
+            self._detour.reset()
             return Velocity(0.0, turn)
         self._state = FollowState.FOLLOWING
         speed = min(max(walks, 0.0) + config.gain * error, self.limits.max_speed)
@@ -313,12 +313,13 @@ class PersonFollower:
         place: tuple[float, float],
         person: PersonSample | None,
         speed: float,
+        dt: float,
         readings: Readings | None,
     ) -> tuple[Velocity, bool]:
         """Return the velocity towards a place, and whether something is gone round.
 
         Straight on where nothing is heard in the way; otherwise along the way that the person
-        walked, until that is straight; and round what is heard there as well (Lv's controller).
+        walked, until that is straight; and round what is heard there as well, along its contour.
         """
         config = self.config
         others = readings
@@ -326,24 +327,31 @@ class PersonFollower:
             others = without_person(readings, self._mounts, person, config.person_radius)
         target = _from(pose, place)
         aim = self._trail.aim((pose.x, pose.y), place, config.corner_cut)
-        if person is None or (
-            others is not None and in_the_way(others, self._mounts, target, config.notice)
-        ):
+        if person is None or self._hears(others, target, surely=False):
             self._on_trail = True
         elif aim == place:
             self._on_trail = False
-        if self._on_trail:
-            target = _from(pose, aim)
+        goal = aim if self._on_trail else place
+        target = _from(pose, goal)
+        if others is not None:
+            # A crumb may lie right before what is in the way: round it leads to the person.
+            blocked = self._hears(others, target)
+            around = self._detour.step(pose, dt, place, others, blocked)
+            if around is not None:
+                return around, True
         bearing = math.atan2(target[1], target[0])
         wanted = Velocity(speed * math.cos(bearing), config.turn_gain * bearing)
         if abs(bearing) > config.turn_in_place_above:
             wanted = Velocity(0.0, wanted.angular_rad_s)
-        if others is None or not in_the_way(others, self._mounts, target, config.notice):
-            return wanted, False
-        step = self._reactive.step(others, Pose2(), target)
-        # Its speed never beyond that of following: the set distance holds here, too.
-        linear = min(wanted.linear_m_s, step.velocity.linear_m_s)
-        return Velocity(linear, step.velocity.angular_rad_s), True
+        return wanted, False
+
+    def _hears(
+        self, others: Readings | None, target: tuple[float, float], surely: bool = True
+    ) -> bool:
+        """Return whether something is heard in the straight way to a target in base_link."""
+        if others is None:
+            return False
+        return in_the_way(others, self._mounts, target, self.config.notice, surely)
 
 
 def _seen_at(pose: Pose2, person: PersonSample) -> tuple[float, float]:

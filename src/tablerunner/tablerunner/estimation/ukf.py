@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints
 
 from tablerunner.estimation.ekf import Ekf, Expected, twist_of
 from tablerunner.estimation.estimator import EstimatorConfig
@@ -30,6 +29,9 @@ class Ukf(Ekf):
     def __init__(
         self, config: EstimatorConfig, anchors: tuple[Anchor, ...], lever_arm: Point3
     ) -> None:
+        # Brings scipy.stats with it, half of what a node takes to start: only where it is needed.
+        from filterpy.kalman import MerweScaledSigmaPoints
+
         super().__init__(config, anchors, lever_arm)
         # Without weight in the middle: all weights are positive, so that no covariance can become
         # negative; the points lie root(n) standard deviations away.

@@ -24,8 +24,8 @@ from tablerunner.experiments.experiment import Bound, Outcome, Progress, Row, Sp
 from tablerunner.experiments.seeds import run_seeds
 from tablerunner.geometry.angles import wrap
 from tablerunner.geometry.pose import Pose2
-from tablerunner.scenario import Scenario
-from tablerunner.types import Matrix, OdometrySample, RangeSample
+from tablerunner.scenario import AnchorPlace, RobotGeometry, Scenario, SensorErrors, Wall
+from tablerunner.types import Matrix, RangeSample
 
 FAR_M = 5.0
 """Within how much driving the pose is to be found."""
@@ -107,9 +107,9 @@ def run_global_start(seeds: Sequence[int], progress: Progress) -> Outcome:
 
 def one_run(seed: int, names: Sequence[str] = ESTIMATED, carried_off: bool = True) -> Run:
     """Return how each estimator finds the pose on the drive of one seed."""
-    room = _room()
+    room = room_of()
     config = ReplayConfig.from_scenario(room)
-    parts = [_part(room, seed, index) for index in range(2 if carried_off else 1)]
+    parts = [part_of(room, seed, index) for index in range(2 if carried_off else 1)]
     sensed = [sense(part, config.ranger, config.odometer) for part in parts]
     result = {}
     for name in names:
@@ -123,14 +123,26 @@ def one_run(seed: int, names: Sequence[str] = ESTIMATED, carried_off: bool = Tru
     return result
 
 
-def _room() -> Scenario:
-    from tablerunner.cli.scenario_file import find_scenario_file
-    from tablerunner.scenario import load_scenario
+def room_of() -> Scenario:
+    """Return the empty room of 15 m x 15 m, four anchors in its corners."""
+    side = 15.0
+    corners = ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side))
+    errors = SensorErrors()
+    return Scenario(
+        name='global_start',
+        walls=(Wall(corners, 'outer wall', closed=True),),
+        anchors=tuple(
+            AnchorPlace(f'A{index}', (*corner, 2.25)) for index, corner in enumerate(corners)
+        ),
+        start=(3.0, 3.0, 0.0),
+        robot=replace(RobotGeometry(), tag_position=(0.0, 0.0, 1.1), ultrasonics=()),
+        sensors=replace(
+            errors, wheels=replace(errors.wheels, rate=10.0), imu=replace(errors.imu, rate=10.0)
+        ),
+    )
 
-    return load_scenario(find_scenario_file('sun2019'))
 
-
-def _part(room: Scenario, seed: int, index: int) -> Drive:
+def part_of(room: Scenario, seed: int, index: int) -> Drive:
     """Return a drive from a random pose along random legs."""
     rng = np.random.default_rng([seed, index])
     low, high = _WALL_M, 15.0 - _WALL_M
@@ -156,19 +168,27 @@ Believed = tuple[int, Matrix | None]
 def _follow(
     fusing: Localizer, samples: Sequence[Sensed], after: int, place: Pose2
 ) -> tuple[list[Believed], Pose2, int]:
-    """Give samples to the localiser, later by `after`, odometry going on from `place`."""
+    """Give samples to the localiser, later by `after`, odometry going on from `place`.
+
+    Ranges wait for the odometry that follows them: a localiser puts them in their place, to the
+    last bit, and has half the work.
+    """
     beliefs: list[Believed] = []
     newest, last = place, after
+    waiting: list[RangeSample] = []
     for sample in samples:
         stamp = sample.stamp + after
         last = max(last, stamp)
         if isinstance(sample, RangeSample):
-            fusing.add_range(replace(sample, stamp=stamp))
-        elif isinstance(sample, OdometrySample):
-            newest = place @ sample.pose
-            fusing.add_odometry(replace(sample, stamp=stamp, pose=newest))
-            estimate = fusing.estimate
-            beliefs.append((stamp, None if estimate is None else estimate.mean[:3]))
+            waiting.append(replace(sample, stamp=stamp))
+            continue
+        newest = place @ sample.pose
+        fusing.add_odometry(replace(sample, stamp=stamp, pose=newest))
+        for held in waiting:
+            fusing.add_range(held)
+        waiting.clear()
+        estimate = fusing.estimate
+        beliefs.append((stamp, None if estimate is None else estimate.mean[:3]))
     return beliefs, newest, last
 
 

@@ -8,8 +8,10 @@ from types import MappingProxyType
 
 from tablerunner.errors import ConfigError
 from tablerunner.experiments.bae2022 import run_bae2022
+from tablerunner.experiments.camera_limits import run_limits
 from tablerunner.experiments.camera_run import run_camera
 from tablerunner.experiments.experiment import Experiment, Outcome, Progress
+from tablerunner.experiments.global_start import run_global_start
 from tablerunner.experiments.lias import run_lias
 from tablerunner.experiments.liu2023 import run_liu2023
 from tablerunner.experiments.lv import run_lv
@@ -25,9 +27,11 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'sun2019': run_sun2019,
         'sun2019_track': run_sun2019_track,
         'pf_uiekf': run_pf_uiekf,
+        'global_start': run_global_start,
         'liu2023': run_liu2023,
         'nlos': run_nlos,
         'ceiling_camera': run_camera,
+        'camera_limits': run_limits,
     }
 )
 

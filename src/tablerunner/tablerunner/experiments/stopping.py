@@ -64,7 +64,8 @@ class Stop:
         At which the reason began: as commanded; at walls and walkers the true one when the
         safety stop said zero.
     way_m : float
-        What the robot drove from then until it stood; with a walker, what the gap lost.
+        What the robot drove from then until it stood; with a walker, what the gap lost. NaN where
+        the robot had not to stop.
     computed_m : float
         What that may be, from that speed.
     gap_m : float
@@ -137,8 +138,9 @@ def _rows(name: str, stops: Sequence[Stop]) -> list[Row]:
         way = Spread.of([stop.way_m for stop in stops])
         bound = Bound(high=stops[0].computed_m, of='high')
         return [Row(f'{name}, way', 'm', way, bound=bound)]
-    share = Spread.of([stop.way_m / stop.computed_m for stop in stops])
-    rows = [Row(f'{name}, of computed', '1', share, bound=Bound(high=1.0, of='high'))]
+    shares = [stop.way_m / stop.computed_m for stop in stops if not math.isnan(stop.way_m)]
+    bound = Bound(high=1.0, of='high')
+    rows = [Row(f'{name}, of computed', '1', Spread.of(shares), bound=bound)] if shares else []
     if kind == 'wall':
         needed = Spread.of([stop.needed for stop in stops])
         rows.append(Row(f'{name}, needed', '1', needed, bound=Bound(high=1.0, of='high')))
@@ -286,13 +288,12 @@ class _Watch:
         drives = drive.speed_m_s > _STANDS_M_S
         if self._began is None and drives and drive.decision.velocity.linear_m_s == 0.0:
             self._began = drive.speed_m_s, place
-        self._place = place
         return self._began is not None and not drives
 
     @property
     def began(self) -> tuple[float, float]:
-        """Speed [m/s] and place when the stop began."""
-        return self._began or (self._drive.speed_m_s, self._place)
+        """Speed [m/s] and place when the stop began; NaN for none."""
+        return self._began or (math.nan, math.nan)
 
     @property
     def touch_m_s(self) -> float:
@@ -328,7 +329,7 @@ def draw(figure: Any, stops: Sequence[Stop]) -> None:
             markersize=3,
             label=kind,
         )
-    top = max(stop.computed_m for stop in stops) * 1.05
+    top = float(np.nanmax([stop.computed_m for stop in stops])) * 1.05
     axes.plot([0.0, top], [0.0, top], color='#000000', linewidth=0.8)
     axes.set_xlabel('computed [m]')
     axes.set_ylabel('measured [m]')

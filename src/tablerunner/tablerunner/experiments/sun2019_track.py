@@ -188,8 +188,8 @@ def _along(places: Array) -> tuple[Array, Array]:
     for x, y in places:
         arc, away = SQUARE.project(float(x), float(y), arc - _BACK_M, arc + _ON_M)
         found.append((arc, away))
-    arcs, aways = np.array(found).T
-    return arcs, aways
+    arcs, distances = np.array(found).T
+    return arcs, distances
 
 
 _COLOURS = ('#0072B2', '#E69F00')

@@ -346,3 +346,17 @@ def test_no_restart_loses_or_repeats_a_stop(
     assert [(item.id, item.tour.reached) for item in ended] == [
         (str(number), stops) for number, stops in enumerate(wanted)
     ]
+
+
+def test_drive_home_that_is_cancelled_is_not_begun_again() -> None:
+    """Who stops the robot on its way home, low battery or not, finds it standing."""
+    world = World(config=MissionConfig(home_after_cancel=True))
+    world.order('a', 'table_1')
+    world.until(MissionState.DRIVING)
+    world.battery.take(0.1, world.now)
+    world.until(MissionState.RETURNING)
+    world.dispatcher.cancel_current()
+    for _ in range(20):
+        world.step()
+    assert not world.dispatcher.mission.is_busy
+    assert sum('going home' in event for event in world.events) == 1

@@ -507,6 +507,8 @@ def test_robot_carried_away_in_a_pause_plans_anew() -> None:
     world.pose = Pose2(2.0, 5.0, 3.0)
     world.mission.resume()
     assert world.run().state is MissionState.DONE
+    assert sum(event.endswith('m to table_1') for event in world.events) == 2
+    assert not any('off the path' in event for event in world.events)
 
 
 def test_pause_and_resume_of_nothing_are_refused() -> None:

@@ -12,6 +12,7 @@ from tablerunner.control.follow_config import FollowConfig, least_distance
 from tablerunner.control.fuzzy.readings import SENSORS, Readings
 from tablerunner.control.person_follower import FollowState, PersonFollower
 from tablerunner.errors import ConfigError
+from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import RobotGeometry
 from tablerunner.types import NANOSECONDS, PersonSample, nanoseconds
@@ -192,6 +193,62 @@ def test_follower_held_up_looks_around():
     assert max(turns[:50]) == pytest.approx(0.0, abs=1e-9)
     assert max(turns) > 0.4
     assert min(turns) < -0.4
+
+
+def echoes_of(discs):
+    """Return what the sensors of a robot at a pose hear of discs (x, y, radius) in the room."""
+
+    def hear(pose):
+        distances = []
+        for mount in MOUNTS:
+            at, nearest = pose @ mount, math.inf
+            for x, y, radius in discs:
+                away = math.dist((at.x, at.y), (x, y))
+                bearing = abs(difference(math.atan2(y - at.y, x - at.x), at.heading))
+                if bearing <= 0.24 + math.asin(min(radius / away, 1.0)):
+                    nearest = min(nearest, away - radius)
+            distances.append(max(nearest, 0.03))
+        return Readings(tuple(distances))
+
+    return hear
+
+
+def test_follower_takes_the_person_for_no_obstacle():
+    """The body is heard at 0.5 m all the time; nothing is gone round."""
+    _, steps = run(
+        make(),
+        lambda t: (1.5 + 0.4 * t, 0.0),
+        15.0,
+        readings=lambda pose: echoes_of([(pose.x + 1.2, 0.0, 0.25)])(pose),
+    )
+    assert {step.state for step in steps} == {FollowState.FOLLOWING}
+    assert steps[-1].velocity.linear_m_s == pytest.approx(0.4, abs=0.03)
+
+
+def test_follower_does_not_go_round_a_single_false_echo():
+    """It lasts 0.15 s, until its sensor fires again."""
+    follower = make()
+    states = set()
+    for number in range(1, 60):
+        heard = Readings((math.inf, math.inf, 0.4, math.inf, math.inf))
+        readings = heard if number % 20 < 3 else FREE
+        stamp = NANOSECONDS + nanoseconds(number * DT)
+        person = seen(Pose2(), (3.0, 0.0))
+        states.add(follower.step(stamp, DT, Pose2(), person, '', readings).state)
+    assert states == {FollowState.FOLLOWING}
+
+
+@pytest.mark.parametrize('aside', [-0.15, 0.05, 0.2])
+def test_follower_goes_round_what_stands_between(aside):
+    """A pillar of 0.2 m radius 2 m ahead: round it without a touch, and to the set distance."""
+    poses, steps = run(
+        make(), lambda _t: (4.5, 0.0), 60.0, readings=echoes_of([(2.0, aside, 0.2)])
+    )
+    gap = min(math.dist((pose.x, pose.y), (2.0, aside)) for pose in poses) - 0.2 - 0.25
+    assert gap > 0.0
+    assert FollowState.ROUND in {step.state for step in steps}
+    assert steps[-1].state is FollowState.STANDING
+    assert steps[-1].distance_m == pytest.approx(1.2, abs=0.16)
 
 
 def test_follower_stopped_comes_to_a_stand_and_is_idle():

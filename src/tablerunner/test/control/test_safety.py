@@ -306,15 +306,24 @@ def test_person_walking_up_stops_the_robot_before_he_is_there() -> None:
 
 
 def test_somebody_who_comes_nearer_slowly_from_ahead_slows_the_robot_in_time() -> None:
-    """At 0.2 m/s by himself, always at the same angle: no wall on the way, but a meeting."""
+    """At 0.2 m/s by himself, always at the same angle: no wall on the way, but a meeting.
+
+    From 0.4 m he is there within 1.2 s at half the speed; a robot that keeps its speed until he is
+    on its way is at 0.6 m/s there.
+    """
     bench = Bench()
     bench.run(3.0)
     distance, speed = 1.5, 0.6
-    while distance > 0.1:
+    while distance > 0.4:
         bench.ranges['ultrasonic_left_front'] = distance
         speed = bench.step().velocity.linear_m_s
         distance -= (0.2 + speed * math.cos(0.45)) * 0.05
-    assert speed <= CONFIG.creep_speed
+    assert speed <= 0.4
+    while distance > 0.15:
+        bench.ranges['ultrasonic_left_front'] = distance
+        speed = bench.step().velocity.linear_m_s
+        distance -= (0.2 + speed * math.cos(0.45)) * 0.05
+    assert speed == 0.0
 
 
 @settings(max_examples=60, deadline=None)

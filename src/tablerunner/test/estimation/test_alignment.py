@@ -15,9 +15,9 @@ CONFIG = LocalizerConfig(tag_position=(-0.1, 0.05, 1.1))
 
 
 def run(room, drive, config=CONFIG, anchors=None):
-    """Feed a drive; return the localiser and what it gave out before it was certain."""
+    """Feed a drive until the localiser is certain; return it and what it gave out before."""
     localizer = Localizer(config, anchors or room.anchors)
-    provisional, begun = [], None
+    provisional = []
     samples = sorted(
         [*drive.odometry, *drive.ranges],
         key=lambda s: (s.stamp, not isinstance(s, OdometrySample)),
@@ -29,9 +29,9 @@ def run(room, drive, config=CONFIG, anchors=None):
             outcome = localizer.add_range(sample)
             if outcome.estimate is not None and localizer.estimate is None:
                 provisional.append(outcome.estimate)
-        if localizer.estimate is not None and begun is None:
-            begun = localizer.estimate
-    return localizer, provisional, begun
+        if localizer.estimate is not None:
+            break
+    return localizer, provisional, localizer.estimate
 
 
 def test_start_is_found_at_the_right_pose_with_honest_covariance(room):

@@ -22,25 +22,23 @@ def lease_domain() -> Iterator[int]:
     """Hold a domain id; the kernel frees its lock however the process ends."""
     folder = Path(tempfile.gettempdir()) / f'tablerunner-test-domains-{os.getuid()}'
     folder.mkdir(exist_ok=True)
-    # Runs side by side start at different numbers, and a domain is not taken again at once: its
-    # last participants may still be saying goodbye.
-    start = (os.getpid() + next(_TURN)) % len(DOMAINS)
-    for number in [*DOMAINS[start:], *DOMAINS[:start]]:
-        with (folder / str(number)).open('w') as lock:
+    # The one that has been free for longest: the last participants of others may still be saying
+    # goodbye. Other test runs and workers of this machine count, too.
+    locks = [folder / str(number) for number in DOMAINS]
+    for path in sorted(locks, key=_last_used):
+        with path.open('w') as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 continue
-            yield number
+            try:
+                yield int(path.name)
+            finally:
+                os.utime(path)
             return
     raise NoDomainError(f'domains {DOMAINS[0]} to {DOMAINS[-1]} are all in use')
 
 
-def _turns() -> Iterator[int]:
-    number = 0
-    while True:
-        yield number
-        number += 1
-
-
-_TURN = _turns()
+def _last_used(path: Path) -> int:
+    """Return when a lock was touched last [ns]; 0 for one that is new."""
+    return path.stat().st_mtime_ns if path.exists() else 0

@@ -28,8 +28,10 @@ from tablerunner.estimation.particles.config import ParticleConfig
 from tablerunner.estimation.particles.iterated import Array, Iteration, drawn, update
 from tablerunner.estimation.particles.kernel import bandwidth, square_root
 from tablerunner.estimation.particles.kld import enough, occupied
+from tablerunner.estimation.particles.progressive import FEWEST, progressed
 from tablerunner.estimation.particles.resampling import RESAMPLERS
 from tablerunner.estimation.particles.swarm import Swarm, Way, rotation
+from tablerunner.estimation.particles.triangular import times
 from tablerunner.estimation.particles.weights import effective_size, normalised
 from tablerunner.types import Matrix, Vector
 
@@ -154,21 +156,35 @@ def absorbed(
 
     if iteration is None:
         y, ratio = normal, np.zeros(len(poses))
-        states = poses + np.einsum('nij,nj->ni', view.roots, y)
+        states = poses + times(view.roots, y)
     else:
         updated = update(poses, view.roots, look, noise, iteration, view[:2])
         proposal = drawn(poses, view.roots, updated, normal)
         states, y, ratio = proposal.states, proposal.whitened, proposal.log_ratio
     offset, _ = look(states, np.arange(len(states)))
-    white = offset @ np.linalg.inv(np.linalg.cholesky(noise)).T
-    found = normalised(swarm.log_weights + ratio + _log_likelihood(white, config.outliers))
+    whiten = np.linalg.inv(np.linalg.cholesky(noise)).T
+    white = offset @ whiten
+    gained = ratio + _log_likelihood(white, config.outliers)
+    found = normalised(swarm.log_weights + gained)
     if found.recovered:
         return None
-    after = _told(swarm, root, y)
-    after = replace(after, poses=states, log_weights=found.log_weights, way=Way.none())
+    after = replace(_told(swarm, root, y), poses=states, way=Way.none())
+    if effective_size(found.log_weights) < min(FEWEST, 0.25 * len(states)) and not _compact(swarm):
+
+        def log_likelihood(drawn_anew: Swarm) -> Vector:
+            seen = view_of(drawn_anew, drawn_anew.poses, sighting)
+            return _log_likelihood(seen.offset @ whiten, config.outliers)
+
+        after = progressed(
+            after, gained, log_likelihood, lambda between: resampled(between, config, rng)
+        )
+        offset = view_of(after, after.poses, sighting).offset
+        white = offset @ whiten
+    else:
+        after = replace(after, log_weights=found.log_weights)
     if sighting.anchors is not None:
         after = _left_over(after, offset, white, noise, sighting.anchors)
-    if effective_size(found.log_weights) < config.threshold * len(states):
+    if effective_size(after.log_weights) < config.threshold * len(after):
         after = resampled(after, config, rng)
     return after
 
@@ -194,8 +210,7 @@ def resampled(swarm: Swarm, config: ParticleConfig, rng: np.random.Generator) ->
     off = apart[rows]
     width = bandwidth(count, 3)
     kernel = width * square_root(covariance)
-    place, heading = math.sqrt(covariance[0, 0] + covariance[1, 1]), math.sqrt(covariance[2, 2])
-    if place < _COMPACT[0] and heading < _COMPACT[1]:
+    if _is_compact(covariance):
         off *= math.sqrt(max(1.0 - width * width, 0.0))
     else:
         deviations = np.maximum(width * np.sqrt(np.diagonal(covariance)[:3]), 1e-12)
@@ -208,6 +223,16 @@ def resampled(swarm: Swarm, config: ParticleConfig, rng: np.random.Generator) ->
         biases=states[:, 6:],
         log_weights=np.full(count, -math.log(count)),
     )
+
+
+def _compact(swarm: Swarm) -> bool:
+    _, covariance = swarm.moments(swarm.now())
+    return _is_compact(covariance)
+
+
+def _is_compact(covariance: Matrix) -> bool:
+    place, heading = math.sqrt(covariance[0, 0] + covariance[1, 1]), math.sqrt(covariance[2, 2])
+    return place < _COMPACT[0] and heading < _COMPACT[1]
 
 
 def _noise(swarm: Swarm, sighting: Sighting) -> Matrix:

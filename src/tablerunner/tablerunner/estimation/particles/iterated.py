@@ -33,6 +33,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tablerunner.estimation.particles.triangular import curvature, solved, spread, times
 from tablerunner.types import Matrix, Vector
 
 Array = NDArray[np.float64]
@@ -134,20 +135,20 @@ def update(
     active = everyone
     for _ in range(iteration.steps):
         here = state.slope[active]
-        pull = np.einsum('kmd,km->kd', here, state.offset[active]) - state.y[active]
+        pull = times(np.swapaxes(here, 1, 2), state.offset[active]) - state.y[active]
         if metric is not None and damping[active].any():
-            bent = _curvature(here) + damping[active, None, None] * metric[active]
+            bent = curvature(here) + damping[active, None, None] * metric[active]
             step = np.linalg.solve(bent, pull[..., None])[..., 0]
         else:
-            step = _solved(here, pull)
+            step = solved(here, pull)
         tried = state.y[active] + step
-        place = mean[active] + np.einsum('kij,kj->ki', root[active], tried)
+        place = mean[active] + times(root[active], tried)
         offset, slope = _whitened(look(place, active), root[active], whiten)
         cost = np.sum(tried**2, axis=1) + np.sum(offset**2, axis=1)
         if iteration.steps == 1:
             slope = state.slope  # an EKF linearises at the prior, its covariance too
         steps[active] += 1
-        short = np.einsum('ki,ki->k', step, pull) < iteration.tolerance**2
+        short = np.sum(step * pull, axis=1) < iteration.tolerance**2
         better = np.ones(len(active), dtype=bool)
         if metric is not None:
             better = cost <= state.cost[active]
@@ -158,9 +159,9 @@ def update(
         active = active[~short]
         if not len(active):
             break
-    spread, log_size = _spread(state.slope)
-    found = mean + np.einsum('kij,kj->ki', root, state.y)
-    return Updated(found, state.y, spread, log_size, state.cost, first_cost, converged, steps)
+    half, log_size = spread(state.slope)
+    found = mean + times(root, state.y)
+    return Updated(found, state.y, half, log_size, state.cost, first_cost, converged, steps)
 
 
 class Drawn(NamedTuple):
@@ -192,9 +193,9 @@ def drawn(mean: Matrix, root: Array, updated: Updated, noise: Matrix) -> Drawn:
         Standard normal.
     """
     # y = y* + B e; the normalising constants and |L| are in both densities.
-    y = updated.whitened + np.einsum('kij,kj->ki', updated.spread, noise)
+    y = updated.whitened + times(updated.spread, noise)
     ratio = 0.5 * np.sum(noise**2, axis=1) - 0.5 * np.sum(y**2, axis=1) + updated.log_size
-    return Drawn(mean + np.einsum('kij,kj->ki', root, y), y, ratio)
+    return Drawn(mean + times(root, y), y, ratio)
 
 
 def covariance_of(root: Array, updated: Updated) -> Array:
@@ -227,37 +228,11 @@ class _State:
 def _whitened(seen: tuple[Matrix, Array], root: Array, whiten: Matrix) -> tuple[Matrix, Array]:
     """Return R^-1/2 (z - h) and R^-1/2 H L."""
     offset, slope = seen
-    return offset @ whiten, whiten.T @ (slope @ root)
-
-
-def _curvature(slope: Array) -> Array:
-    """Return I + V V', with V' = R^-1/2 H L."""
-    return np.asarray(np.eye(slope.shape[-1]) + np.swapaxes(slope, -1, -2) @ slope)
-
-
-def _solved(slope: Array, pull: Matrix) -> Matrix:
-    """Return (I + V V')^-1 pull."""
-    if slope.shape[1] == 1:  # one number: Sherman and Morrison, without any matrix
-        v = slope[:, 0]
-        share = np.sum(v * pull, axis=1) / (1.0 + np.sum(v * v, axis=1))
-        return np.asarray(pull - share[:, None] * v)
-    return np.asarray(np.linalg.solve(_curvature(slope), pull[..., None])[..., 0])
-
-
-def _spread(slope: Array) -> tuple[Array, Vector]:
-    """Return B of B B' = (I + V V')^-1, and the log of its determinant."""
-    if slope.shape[1] == 1:
-        v = slope[:, 0]
-        square = np.sum(v * v, axis=1)
-        # (I + v v')^-1/2 = I - c v v' with c = (1 - 1/sqrt(1 + v'v)) / v'v, written so that a v of
-        # no length is no trouble.
-        grown = np.sqrt(1.0 + square)
-        share = 1.0 / (grown * (grown + 1.0))
-        half = np.eye(slope.shape[2]) - (share[:, None] * v)[:, :, None] * v[:, None, :]
-        return half, -np.log(grown)
-    factor = np.linalg.cholesky(_curvature(slope))
-    log_size = -np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
-    return np.swapaxes(np.linalg.inv(factor), -1, -2), np.asarray(log_size)
+    along = slope @ root
+    count, rows, size = along.shape
+    # One product of matrices for all, instead of one for each.
+    flat = whiten.T @ along.transpose(1, 0, 2).reshape(rows, -1)
+    return offset @ whiten, flat.reshape(rows, count, size).transpose(1, 0, 2)
 
 
 def _damping(damping: Vector, better: NDArray[np.bool_], slope: Array, metric: Array) -> Vector:

@@ -42,7 +42,7 @@ def draw_camera_calibration(
         panels.append(('marked points', points, point_residuals))
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for axis, (title, places, residuals) in zip(axes, panels, strict=True):
-        rms = float(np.sqrt(np.mean(residuals**2)))
+        rms = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))
         # As large as can be told apart: the usual arrow a fortieth of the width.
         factor = size[0] / 40.0 / max(rms, 1e-6)
         factor = float(f'{factor:.1g}')

@@ -90,7 +90,7 @@ def fit_mount(lens: Lens, pixels: ArrayLike, places: ArrayLike) -> MountFit:
     except ValueError as error:
         raise GeometryError(f'no camera fits the points ({error})') from error
     residuals = np.asarray(found.fun).reshape(-1, 2)
-    rms = float(np.sqrt(np.mean(residuals**2)))
+    rms = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))
     if rms > WORST_RMS_PX:
         worst = int(np.argmax(np.linalg.norm(residuals, axis=1)))
         raise GeometryError(
