@@ -29,6 +29,7 @@ from tablerunner.types import Velocity, nanoseconds, seconds
 _PLAN_RETRY_S = 2.0
 _PLAN_TRIES = 4
 _LONGEST_STEP_S = 0.5
+_NEAR_M = 0.3
 
 
 class Mission:
@@ -361,7 +362,7 @@ class Mission:
     def _watch(
         self, situation: Situation, pose: Pose2, stop: Destination, drive: Drive, dt: float
     ) -> bool:
-        """Look whether the robot gets on; False: the stop was given up."""
+        """Look whether the robot gets on; False: the stop was given up, or is near enough."""
         config = self.config
         stuck_s = self._progress.stuck_s(
             situation.stamp,
@@ -382,6 +383,11 @@ class Mission:
             self._miss(f'way blocked for {self._leg.blocked_s:.0f} s')
             return False
         if stuck_s >= self._leg.replan_at:
+            off = pose.distance_to(stop.pose)
+            if off <= _NEAR_M:  # a pose that is off by this much lets it come no nearer
+                self._events.append(f'as near to {stop.name} as it gets: {off:.2f} m')
+                self._arrive(stop)
+                return False
             self._leg.replan_at = stuck_s + config.replan_after
             self._around(situation, pose, stop)
         return True

@@ -147,3 +147,17 @@ def test_mission_stands_while_somebody_comes_nearer() -> None:
     assert 0.0 < speeds[42].linear_m_s < 0.6  # brakes, and not at once
     assert all(speeds[step].linear_m_s == 0.0 for step in range(60, 80))
     assert speeds[110].linear_m_s > 0.3
+
+
+@pytest.mark.parametrize(('off', 'arrives'), [(0.2, True), (0.5, False)])
+def test_blocked_close_to_a_stop_is_near_enough(off: float, arrives: bool) -> None:
+    """Tolerance is 0.12 m; the safety stop lets the robot come no nearer."""
+    planner = make_planner(Scenario('room', walls=(OUTER,), start=(1.0, 1.0, 0.0)))
+    mission = Mission(MissionConfig(), planner, PurePursuit(FollowerConfig(), VelocityLimits()))
+    mission.start((GOAL,))
+    pose = Pose2(7.0 - off, 1.0, 0.0)
+    for step in range(1, 400):
+        stamp = step * nanoseconds(0.05)
+        situation = Situation(stamp, pose, stamp, 0.05, 0.05, True, (0.35, 0.0))
+        _, status = mission.step(situation)
+    assert status.reached == (('goal',) if arrives else ())
