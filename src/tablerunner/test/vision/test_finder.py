@@ -131,6 +131,16 @@ def test_coloured_disc_on_a_bright_floor_is_no_marker(room: object, radius: int)
     assert finder_of(room).find(alone)['robot'] == UNSEEN
 
 
+def test_discs_on_a_green_cloth_are_no_marker(room: object) -> None:
+    """All is as on a marker, but for the plate, which is dark green."""
+    picture = room.picture(Pose2(0.2, 0.1, 0.4))
+    assert isinstance(finder_of(room).find(picture)['robot'], Sighting)
+    u, v = (round(value) for value in room_pixel(room, Pose2(0.2, 0.1)))
+    around = picture[v - 30 : v + 30, u - 30 : u + 30]
+    around[around.max(axis=2) < 60] = (24, 60, 24)
+    assert finder_of(room).find(picture)['robot'] == UNSEEN
+
+
 def test_plain_disc_gives_a_place_and_no_heading(room: object) -> None:
     config = CONFIG.replace(front_radius=0.0, disc_x=0.0)
     marker = Marker(front_radius=0.0, disc_x=0.0)
