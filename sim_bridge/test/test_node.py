@@ -275,7 +275,7 @@ def test_bridge_camera_pictures_come_with_their_lens(probe: Probe, tmp_path: Pat
     """Stamp and size agree; pictures leave at 10 Hz of simulated time, after their exposure."""
     path = tmp_path / 'room.yaml'
     camera = 'camera: {position: [3, 5, 3], width: 64, height: 48, focal: [40, 40], delay: 0.06}\n'
-    path.write_text(ROOM + camera + 'robot: {marker: {}}\n', encoding='utf-8')
+    path.write_text(ROOM.replace('robot:\n', 'robot:\n  marker: {}\n') + camera, encoding='utf-8')
     images = probe.listen(Image, 'camera/image_raw')
     infos = probe.listen(CameraInfo, 'camera/camera_info')
     clocks = probe.listen(Clock, 'clock')

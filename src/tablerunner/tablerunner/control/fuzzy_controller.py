@@ -41,7 +41,7 @@ class DetourConfig(Config):
         0.35, description='So near the robot waits before it', unit='m', low=0.0
     )
     wait: float = parameter(
-        3.0,
+        12.0,
         description='So long it must stand there: people walk on, and another path may come',
         unit='s',
         low=0.0,

@@ -29,6 +29,7 @@ from tablerunner.types import Velocity, nanoseconds, seconds
 _PLAN_RETRY_S = 2.0
 _PLAN_TRIES = 4
 _LONGEST_STEP_S = 0.5
+_NEAR_M = 0.3
 
 
 class Mission:
@@ -215,7 +216,7 @@ class Mission:
         velocity: Velocity | None = None
         if self.is_busy and not self._paused:
             velocity = self._advance(situation, elapsed)
-        if velocity is None or self._ways.is_approached(situation.stamp):
+        if velocity is None:
             velocity = self.controller.halt(min(elapsed, _LONGEST_STEP_S))
         status = self.status
         self._events = []
@@ -263,6 +264,8 @@ class Mission:
             self._miss(f'not reached within {self.config.stop_limit:.0f} s')
             return None
         if leg.path is None and not self._plan(situation, pose, stop):
+            return None
+        if self._ways.is_approached(situation.stamp):
             return None
         self._look_ahead(situation, pose, stop)
         drive = self.controller.step(pose, dt)
@@ -359,7 +362,7 @@ class Mission:
     def _watch(
         self, situation: Situation, pose: Pose2, stop: Destination, drive: Drive, dt: float
     ) -> bool:
-        """Look whether the robot gets on; False: the stop was given up."""
+        """Look whether the robot gets on; False: the stop was given up, or is near enough."""
         config = self.config
         stuck_s = self._progress.stuck_s(
             situation.stamp,
@@ -380,6 +383,11 @@ class Mission:
             self._miss(f'way blocked for {self._leg.blocked_s:.0f} s')
             return False
         if stuck_s >= self._leg.replan_at:
+            off = pose.distance_to(stop.pose)
+            if off <= _NEAR_M:  # a pose that is off by this much lets it come no nearer
+                self._events.append(f'as near to {stop.name} as it gets: {off:.2f} m')
+                self._arrive(stop)
+                return False
             self._leg.replan_at = stuck_s + config.replan_after
             self._around(situation, pose, stop)
         return True

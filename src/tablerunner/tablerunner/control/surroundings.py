@@ -67,7 +67,7 @@ class SurroundingsConfig(Config):
         15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
     shy: float = parameter(
-        0.8, description='Who comes nearer than this by himself is waited for', unit='m', low=0.0
+        1.2, description='Who comes nearer than this by himself is waited for', unit='m', low=0.0
     )
     walking: float = parameter(
         0.35, description='Coming nearer faster than this is walking', unit='m/s', above=0.0

@@ -20,6 +20,7 @@ _SPACE_M = 0.03
 _LONGER_M = 1.5
 _WALK_M_S = 0.4  # about the mean speed of a robot that gets on
 _MOVED_M = 0.3
+_YIELDS_S = 3.0
 
 
 class WayFinder:
@@ -37,6 +38,7 @@ class WayFinder:
         self.planner = planner
         self.surroundings = surroundings
         self._turned: Pose2 | None = None
+        self._yields_since: int | None = None
         self.begin()
 
     def hear(self, readings: Readings, pose: Pose2, stamp: int) -> None:
@@ -45,8 +47,16 @@ class WayFinder:
             self.surroundings.hear(readings, pose, stamp)
 
     def is_approached(self, stamp: int) -> bool:
-        """Return whether somebody has just come nearer by himself."""
-        return self.surroundings is not None and self.surroundings.is_approached(stamp)
+        """Return whether to wait for somebody who has just come nearer by himself.
+
+        Not for ever: from then on the safety stop alone minds those who come and go.
+        """
+        if self.surroundings is None or not self.surroundings.is_approached(stamp):
+            self._yields_since = None
+            return False
+        if self._yields_since is None:
+            self._yields_since = stamp
+        return seconds(stamp - self._yields_since) < _YIELDS_S
 
     def begin(self) -> None:
         """Look along a new path from now on."""

@@ -169,7 +169,7 @@ def test_plot_writes_a_picture(bag: Path, tmp_path: Path) -> None:
         (['info', '{tmp}/missing'], 'there is no bag at'),
         (['plot', '{tmp}/missing'], 'there is no bag at'),
         (['replay', '{bag}', '--estimator', 'magic'], "estimator: got 'magic', expected one of"),
-        (['replay', '{bag}', '--estimator', 'ekf,magic'], 'ddf, dead_reckoning, all'),
+        (['replay', '{bag}', '--estimator', 'ekf,magic'], 'pf_iekf, pf_uiekf, all'),
         (['replay', '{bag}', '--estimator', 'kf', '--smooth'], "--smooth: got 'kf', expected one"),
         (['replay', '{bag}', '--estimator', 'all', '--plot', '{tmp}/x.png'], 'one estimator'),
         (['tune', '{tmp}/missing'], 'there is no bag at'),

@@ -168,3 +168,25 @@ def test_path_that_leads_aside_is_turned_to_first(bearing: float) -> None:
         pose = pose @ Pose2(way * math.cos(turn / 2), way * math.sin(turn / 2), turn)
     assert step.arrived
     assert max(offs) < 0.1
+
+
+@pytest.mark.parametrize(
+    ('heard', 'sign'),
+    [
+        ((math.inf, 0.2, math.inf, math.inf, math.inf), -1),
+        ((0.1, math.inf, math.inf, math.inf, math.inf), -1),
+        ((math.inf, math.inf, math.inf, 0.2, math.inf), 1),
+        ((math.inf, math.inf, math.inf, math.inf, 0.1), 1),
+        ((0.15, 0.2, math.inf, 0.2, 0.15), 0),
+        ((0.4, 0.4, math.inf, 0.5, 0.4), 0),
+    ],
+)
+def test_turns_away_from_what_is_near_on_one_side(heard, sign) -> None:
+    """On the path and along it, so that there is no other reason to turn."""
+    controller = make()
+    controller.follow(PATH)
+    for _ in range(10):
+        controller.hear(Readings(heard))
+        velocity = controller.step(Pose2(2.0, 1.5, 0.0), DT).velocity
+    assert np.sign(round(velocity.angular_rad_s, 6)) == sign
+    assert velocity.linear_m_s > 0.1

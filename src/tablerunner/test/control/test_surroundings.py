@@ -130,3 +130,33 @@ def test_single_false_echo_is_not_believed() -> None:
     listener.found.hear(listener.ring.readings(listener.stamp), at, listener.stamp)
     assert listener.found._evidence.max() > 0.5
     assert not len(listener.places())
+
+
+def moving(listener: Listener, pose_speed: float, thing_speed: float, seconds: float) -> bool:
+    """Drive at a chair that comes nearer itself; return whether that was ever noticed."""
+    noticed = False
+    pose, x = Pose2(1.0, 2.0, 0.0), 2.6
+    for _ in range(round(seconds / 0.03)):
+        pose = Pose2(pose.x + 0.03 * pose_speed, pose.y, pose.heading)
+        x -= 0.03 * thing_speed
+        listener.turn_to(room(Box('chair', x, 2.0, 0.45, 0.45)))
+        listener.sonar._turn = round(listener.stamp / nanoseconds(0.03)) % 5
+        listener.stand(pose, 0.03)
+        noticed = noticed or listener.found.is_approached(listener.stamp)
+    return noticed
+
+
+def test_who_comes_nearer_is_noticed_and_what_is_driven_at_is_not() -> None:
+    for seed in range(3):
+        assert moving(Listener(room(CHAIR), room(), seed), 0.0, 0.7, 1.0)
+        assert moving(Listener(room(CHAIR), room(), seed), 0.3, 0.7, 0.8)
+        assert not moving(Listener(room(CHAIR), room(), seed), 0.5, 0.0, 1.2)
+        assert not moving(Listener(room(CHAIR), room(), seed), 0.0, 0.0, 2.0)
+
+
+def test_who_has_come_nearer_is_waited_for_only_for_a_while() -> None:
+    listener = Listener(room(CHAIR), room(), 1)
+    assert moving(listener, 0.0, 0.7, 1.0)
+    listener.turn_to(room())
+    listener.stand(Pose2(1.0, 2.0, 0.0), SurroundingsConfig().yield_time + 0.1)
+    assert not listener.found.is_approached(listener.stamp)

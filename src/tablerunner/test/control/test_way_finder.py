@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tablerunner.control import Destination, Surroundings, make_planner
+from tablerunner.control import (
+    Destination,
+    FollowerConfig,
+    Mission,
+    MissionConfig,
+    PurePursuit,
+    Situation,
+    Surroundings,
+    VelocityLimits,
+    make_planner,
+)
 from tablerunner.control.path import Path
 from tablerunner.control.way_finder import WayFinder
 from tablerunner.errors import PlanningError
@@ -110,3 +120,44 @@ def test_without_surroundings_the_map_is_all_there_is() -> None:
     path = finder.way(START, GOAL, ())
     assert isinstance(path, Path)
     assert finder.other_way(NOW, START, GOAL, path, path.length, ()) is None
+
+
+def test_mission_stands_while_somebody_comes_nearer() -> None:
+    planner = make_planner(Scenario('room', walls=(OUTER,), start=(1.0, 1.0, 0.0)))
+
+    class Approached(Surroundings):
+        """Somebody comes nearer between two stamps."""
+
+        def is_approached(self, stamp: int) -> bool:
+            return 2 * NANOSECONDS <= stamp < 4 * NANOSECONDS
+
+    mission = Mission(
+        MissionConfig(),
+        planner,
+        PurePursuit(FollowerConfig(), VelocityLimits()),
+        surroundings=Approached(planner.floor, ()),
+    )
+    mission.start((GOAL,))
+    speeds = {}
+    for step in range(1, 120):
+        stamp = step * nanoseconds(0.05)
+        situation = Situation(stamp, START, stamp, 0.05, 0.05)
+        speeds[step], _ = mission.step(situation)
+    assert speeds[39].linear_m_s == pytest.approx(0.6)
+    assert 0.0 < speeds[42].linear_m_s < 0.6  # brakes, and not at once
+    assert all(speeds[step].linear_m_s == 0.0 for step in range(60, 80))
+    assert speeds[110].linear_m_s > 0.3
+
+
+@pytest.mark.parametrize(('off', 'arrives'), [(0.2, True), (0.5, False)])
+def test_blocked_close_to_a_stop_is_near_enough(off: float, arrives: bool) -> None:
+    """Tolerance is 0.12 m; the safety stop lets the robot come no nearer."""
+    planner = make_planner(Scenario('room', walls=(OUTER,), start=(1.0, 1.0, 0.0)))
+    mission = Mission(MissionConfig(), planner, PurePursuit(FollowerConfig(), VelocityLimits()))
+    mission.start((GOAL,))
+    pose = Pose2(7.0 - off, 1.0, 0.0)
+    for step in range(1, 400):
+        stamp = step * nanoseconds(0.05)
+        situation = Situation(stamp, pose, stamp, 0.05, 0.05, True, (0.35, 0.0))
+        _, status = mission.step(situation)
+    assert status.reached == (('goal',) if arrives else ())

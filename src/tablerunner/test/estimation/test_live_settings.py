@@ -122,7 +122,12 @@ def run(room, samples, config, later):
         )
 
 
-ESTIMATOR_OF = {'filter.sun.': ('kf', 'ekf_cv'), 'filter.ddf.': ('ddf',), 'positioner.': ('kf',)}
+ESTIMATOR_OF = {
+    'filter.sun.': ('kf', 'ekf_cv'),
+    'filter.ddf.': ('ddf',),
+    'filter.particles.': ('pf',),
+    'positioner.': ('kf',),
+}
 
 # What another setting would hide: the robot is lost for one reason before it is for the next.
 BESIDE = {'lost_silence': {'lost_nis': 1000.0}, 'lost_doubt': {'lost_nis': 1000.0}}

@@ -29,10 +29,14 @@ def room(*boxes: Box, people: tuple[Person, ...] = ()) -> Scenario:
 
 
 def driven(
-    scenario: Scenario, seed: int, settings: LoopSettings, known: Scenario | None = None
+    scenario: Scenario,
+    seed: int,
+    settings: LoopSettings,
+    known: Scenario | None = None,
+    longest_s: float = 120.0,
 ) -> list[LoopStep]:
     loop = ClosedLoop(scenario, seed, settings, known)
-    return list(loop.drive((table_stop(scenario, 'table_1', 1.0),), longest_s=120.0))
+    return list(loop.drive((table_stop(scenario, 'table_1', 1.0),), longest_s=longest_s))
 
 
 @pytest.mark.parametrize(
@@ -52,7 +56,7 @@ def test_delivers_and_comes_home(controller: str, unknown: bool) -> None:
 
 
 def test_steps_come_at_the_rate_of_control_on_the_clock_of_the_simulation() -> None:
-    steps = driven(room(), 1, LoopSettings())
+    steps = driven(room(), 1, LoopSettings(), longest_s=6.0)
     apart = [seconds(b.stamp - a.stamp) for a, b in itertools.pairwise(steps)]
     assert min(apart) == pytest.approx(0.04)  # ticks of 20 ms: 40 or 60 ms
     assert max(apart) == pytest.approx(0.06)
@@ -62,7 +66,10 @@ def test_steps_come_at_the_rate_of_control_on_the_clock_of_the_simulation() -> N
 def test_same_seed_same_drive_bit_for_bit() -> None:
     person = Person('guest', ((1.5, 3.4), (5.0, 1.0)))
     first, again, other = (
-        [step.truth.pose for step in driven(room(people=(person,)), seed, LoopSettings())]
+        [
+            step.truth.pose
+            for step in driven(room(people=(person,)), seed, LoopSettings(), longest_s=12.0)
+        ]
         for seed in (5, 5, 6)
     )
     assert first == again
@@ -72,7 +79,7 @@ def test_same_seed_same_drive_bit_for_bit() -> None:
 def test_what_is_not_on_the_map_is_not_planned_round_but_heard() -> None:
     chair = Box('chair', 2.6, 1.5, 0.5, 0.5)
     blind, sharp = room(), room(chair)
-    steps = driven(sharp, 2, LoopSettings(controller='pure_pursuit'), known=blind)
+    steps = driven(sharp, 2, LoopSettings(controller='pure_pursuit'), known=blind, longest_s=15.0)
     path = next(step.status.path for step in steps if step.status.path is not None)
     off = [math.dist((2.6, 1.5), path.at(arc)) for arc in (1.0, 1.5, 2.0, 2.5)]
     assert min(off) < 0.3

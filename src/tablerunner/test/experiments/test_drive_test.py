@@ -20,7 +20,7 @@ from tablerunner.experiments.random_room import make_drive_room
 from tablerunner.geometry.pose import Pose2
 from tablerunner.simulation import Contact
 
-QUICK = {7: 'walled in', 10: 'door closed'}
+QUICK = {10: 'door closed', 1002: 'walled in', 1006: 'open'}
 """Seeds of short tours and their kinds."""
 
 
