@@ -82,7 +82,7 @@ def bias_covariance(config: EstimatorConfig, count: int) -> Matrix:
 def range_variance(config: EstimatorConfig, sample: RangeSample) -> float:
     """Return the variance of a range [m^2], with what NLOS may add to it."""
     variance = sample.variance_m2 if sample.variance_m2 > 0.0 else config.default_range_std**2
-    least = config.least_range_std**2
+    least = config.least_range_std * config.least_range_std
     if variance < least:
         variance = least
     probability = sample.nlos_probability
@@ -222,14 +222,13 @@ class Ekf:
         config, memory = self.config, list(estimate.memory)
         places = [self._places[sample.anchor_id] for sample in samples]
         expected, slopes = predict_ranges(estimate.mean, places, self.lever_arm, estimate.twist)
-        innovations = [
-            sample.range_m - self._told_bias[sample.anchor_id] - value
-            for sample, value in zip(samples, expected, strict=True)
-        ]
+        innovations = []
         cross = slopes.dot(estimate.covariance)
         spread = cross.dot(slopes.T)
         for row, sample in enumerate(samples):
             spread[row, row] += range_variance(config, sample)
+            told = sample.range_m - self._told_bias[sample.anchor_id]
+            innovations.append(told - expected[row])
         # LAPACK itself, for NumPy's wrappers take longer than the arithmetic, and so do names of
         # arguments: lower, clean, overwrite.
         root, fault = dpotrf(spread.T, 1, 1, 1)
@@ -405,10 +404,10 @@ def twist_of(estimate: Estimate, moved: Vector, motion: Motion) -> tuple[float, 
         return estimate.twist
     if motion.distance_m == 0.0 and motion.turn_rad == 0.0:
         return STANDING
-    turn = (1.0 + float(moved[TURN_SCALE])) * motion.turn_rad / motion.dt_s
+    scale, turn_scale, gyro_bias = moved[SCALE : GYRO_BIAS + 1].tolist()
     return (
-        (1.0 + float(moved[SCALE])) * motion.distance_m / motion.dt_s,
-        turn - float(moved[GYRO_BIAS]),
+        (1.0 + scale) * motion.distance_m / motion.dt_s,
+        (1.0 + turn_scale) * motion.turn_rad / motion.dt_s - gyro_bias,
     )
 
 

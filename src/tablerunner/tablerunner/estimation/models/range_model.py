@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -108,19 +107,12 @@ def predict_ranges(
     return expected, jacobian
 
 
-class _Tag(NamedTuple):
-    """Where the tag was when the range was taken, seen from the base and in map."""
+def _tag(values: list[float], lever_arm: Point3, twist: Twist) -> tuple[float, ...]:
+    """Return where the tag was when the range was taken, and how that hangs on the delay.
 
-    x: float
-    y: float
-    z: float
-    from_base_x: float
-    from_base_y: float
-    by_delay_x: float  # d(x)/d(delay) [m/s]
-    by_delay_y: float
-
-
-def _tag(values: list[float], lever_arm: Point3, twist: Twist) -> _Tag:
+    x, y, z in map; x, y from the base, in map's directions; d(x)/d(delay), d(y)/d(delay) [m/s]. A
+    plain tuple: names would cost as much as all cosines.
+    """
     x, y, heading, delay = values[X], values[Y], values[HEADING], values[RANGE_DELAY]
     speed, turn_rate = twist
     cos, sin = math.cos(heading), math.sin(heading)
@@ -134,7 +126,7 @@ def _tag(values: list[float], lever_arm: Point3, twist: Twist) -> _Tag:
     tag_x, tag_y = cos * ahead - sin * arm_y, sin * ahead + cos * arm_y
     # The tag moves with the base and round it; a delay takes it back.
     along, aside = speed - turn_rate * arm_y, turn_rate * arm_x
-    return _Tag(
+    return (
         x + tag_x,
         y + tag_y,
         arm_z,
