@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import statistics
 import sys
 import tempfile
 import time
@@ -16,7 +15,7 @@ from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from result import Result
+from result import Result, latencies
 from sensor_msgs.msg import JointState
 
 from tablerunner_interfaces.msg import UwbExchange
@@ -152,17 +151,9 @@ def measure() -> Iterator[Result]:
     own, passed = ours(), relays()
     own += ours()
     passed += relays()
-    for name, pick, bound in (
-        ('latency, median', statistics.median, 1.5),
-        ('latency, 95 %', lambda values: sorted(values)[int(0.95 * len(values))], None),
-    ):
-        us, them = pick(own) * 1e3, pick(passed) * 1e3
-        yield Result(
-            name,
-            us,
-            them,
-            us / them,
-            'ms',
-            'uwb/exchanges to odometry/filtered; reference: two nodes that pass UwbExchange on',
-            bound,
-        )
+    yield from latencies(
+        'latency',
+        own,
+        passed,
+        'uwb/exchanges to odometry/filtered; reference: two nodes that pass UwbExchange on',
+    )

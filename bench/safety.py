@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import statistics
 import sys
 import tempfile
 import time
@@ -16,7 +15,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.node import Node
-from result import Result
+from result import Result, latencies
 from sensor_msgs.msg import Range
 
 from tablerunner_ros.executor import make_executor
@@ -162,17 +161,9 @@ def measure() -> Iterator[Result]:
     own, passed = ours(), relay()
     own += ours()
     passed += relay()
-    for name, pick, bound in (
-        ('safety latency, median', statistics.median, 1.5),
-        ('safety latency, 95 %', lambda values: sorted(values)[int(0.95 * len(values))], None),
-    ):
-        us, them = pick(own) * 1e3, pick(passed) * 1e3
-        yield Result(
-            name,
-            us,
-            them,
-            us / them,
-            'ms',
-            'ultrasonic reading to zero on cmd_vel; reference: a node that answers each reading',
-            bound,
-        )
+    yield from latencies(
+        'safety latency',
+        own,
+        passed,
+        'ultrasonic reading to zero on cmd_vel; reference: a node that answers each reading',
+    )
