@@ -32,7 +32,12 @@ class Assembly(NamedTuple):
         limits = limits_within(config.limits, self.scenario.robot.limits)
         configure_controller(self.controller, limits, config.controllers)
         self.controller.explain(config.publish_trace)
-        self.mission.configure(config.mission, self.planner.configured(config.planner))
+        self.mission.configure(
+            config.mission,
+            self.planner.configured(config.planner),
+            config.caution,
+            config.blockade,
+        )
 
 
 def assemble(config: NavNodeConfig, scenario: Scenario) -> Assembly:
@@ -51,5 +56,13 @@ def assemble(config: NavNodeConfig, scenario: Scenario) -> Assembly:
     controller.explain(config.publish_trace)
     planner = make_planner(scenario, config.planner)
     found = make_surroundings(scenario, planner, config.surroundings, frames)
-    mission = Mission(config.mission, planner, controller, home_of(scenario), found)
+    mission = Mission(
+        config.mission,
+        planner,
+        controller,
+        home_of(scenario),
+        found,
+        config.caution,
+        config.blockade,
+    )
     return Assembly(scenario, planner, controller, mission)

@@ -9,6 +9,8 @@ from tablerunner.config import Config, parameter
 from tablerunner.control import (
     CONTROLLERS,
     BatteryConfig,
+    BlockadeConfig,
+    CautionConfig,
     ControllerSettings,
     FollowerConfig,
     MissionConfig,
@@ -75,6 +77,12 @@ class NavNodeConfig(Config):
     surroundings: SurroundingsConfig = parameter(
         factory=SurroundingsConfig,
         description='How what the sensors find beside the map is weighed',
+    )
+    caution: CautionConfig = parameter(
+        factory=CautionConfig, description='How careful it is where somebody may step into its way'
+    )
+    blockade: BlockadeConfig = parameter(
+        factory=BlockadeConfig, description='When what is in the way is there to stay'
     )
     mission: MissionConfig = parameter(
         factory=MissionConfig, description='How patient a mission is'

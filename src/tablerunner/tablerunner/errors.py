@@ -86,5 +86,9 @@ class PlanningError(TablerunnerError):
     """No way leads to the goal, or the goal is not a place where the robot can stand."""
 
 
+class NoWayError(PlanningError):
+    """Start and goal are good places, but what stands between them leaves no way."""
+
+
 class MissionError(TablerunnerError):
     """A mission cannot be taken on: the robot is busy, or there is nothing to do."""

@@ -1,7 +1,9 @@
 """Driving: planning, following a path, missions, and the safety stop; free of estimation."""
 
 from tablerunner.control.battery import Battery, BatteryConfig
+from tablerunner.control.blockades import BlockadeConfig
 from tablerunner.control.braking import largest_speed, stopping_distance
+from tablerunner.control.caution import CautionConfig
 from tablerunner.control.controller import Controller, Drive
 from tablerunner.control.delivery_queue import Delivery, DeliveryQueue
 from tablerunner.control.delivery_store import DeliveryStore
@@ -44,6 +46,8 @@ __all__ = [
     'CONTROLLERS',
     'Battery',
     'BatteryConfig',
+    'BlockadeConfig',
+    'CautionConfig',
     'Controller',
     'ControllerSettings',
     'Delivery',

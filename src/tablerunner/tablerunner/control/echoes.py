@@ -28,6 +28,7 @@ _SHARP_M = 0.7
 _WALKER_NS = 10 * NANOSECONDS
 _BEYOND_M = 0.15  # something nearer by this than the echo would have been heard
 _ENOUGH_MISSES = 2
+_INSIDE_M = 0.02  # deeper inside the hull than noise and motion put what touches it
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +46,15 @@ class EchoTimes:
         nothing [s].
     near_m : float
         Distance from base_link that is near [m].
+    hull_m : float
+        Radius of the hull about base_link [m]: nothing is where the robot itself has been since.
     """
 
     hold_s: float
     near_s: float
     memory_s: float
     near_m: float
+    hull_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,9 +278,12 @@ class EchoMemory:
         times = self.times
         age = (now - self._stamps) / NANOSECONDS
         away = np.hypot(self._points[:, 0] - self._pose.x, self._points[:, 1] - self._pose.y)
-        kept = (age <= times.hold_s) | self._is_newest()
+        newest = self._is_newest()
+        kept = age <= times.hold_s
         kept |= self._confirmed & (away <= times.near_m) & (age <= times.near_s)
         kept |= self._sharp & (self._misses < _ENOUGH_MISSES) & (age <= times.memory_s)
+        kept &= away >= times.hull_m - _INSIDE_M
+        kept |= newest
         if not kept.all():
             self._points, self._stamps = self._points[kept], self._stamps[kept]
             self._sensors, self._confirmed = self._sensors[kept], self._confirmed[kept]

@@ -32,6 +32,12 @@ class Leg:
         Time blocked, in all.
     stuck : bool
         Whether it is time to look around.
+    retreat_until : int
+        Until this stamp the robot makes way for somebody [ns]; 0: it does not.
+    retreated : bool
+        Whether it stands where it went for that.
+    retreat_again : int
+        Not before this stamp [ns].
     """
 
     replan_at: float
@@ -43,3 +49,6 @@ class Leg:
     plan_tries: int = 0
     blocked_s: float = 0.0
     stuck: bool = False
+    retreat_until: int = 0
+    retreated: bool = False
+    retreat_again: int = 0

@@ -7,14 +7,17 @@ states there are and what leads from one to the other: docs/navigation.md.
 from __future__ import annotations
 
 from tablerunner.control.alignment import AlignmentDrive
+from tablerunner.control.blockades import BlockadeConfig
+from tablerunner.control.caution import CautionConfig
 from tablerunner.control.controller import Controller, Drive
 from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
+from tablerunner.control.floor_map import Disc
 from tablerunner.control.fuzzy.readings import Readings
 from tablerunner.control.hand_over import HandOver
 from tablerunner.control.leg import Leg
 from tablerunner.control.look_around import LookAround
 from tablerunner.control.lost_watch import LostWatch
-from tablerunner.control.marks import Marks, disc_ahead
+from tablerunner.control.marks import disc_ahead
 from tablerunner.control.mission_config import MissionConfig
 from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner
@@ -22,7 +25,7 @@ from tablerunner.control.progress import ProgressWatch
 from tablerunner.control.surroundings import Surroundings
 from tablerunner.control.tour import Tour, check_stops
 from tablerunner.control.way_finder import WayFinder
-from tablerunner.errors import MissionError, PlanningError
+from tablerunner.errors import MissionError, NoWayError, PlanningError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Velocity, nanoseconds, seconds
 
@@ -30,6 +33,10 @@ _PLAN_RETRY_S = 2.0
 _PLAN_TRIES = 4
 _LONGEST_STEP_S = 0.5
 _NEAR_M = 0.3
+_LOOK_PAUSE_S = 12.0
+_RETREAT_S = 20.0
+_ASIDE_S = 4.0
+_RETREAT_AGAIN_S = 30.0
 
 
 class Mission:
@@ -45,6 +52,8 @@ class Mission:
         Where a mission with ``return_home`` ends.
     surroundings : Surroundings or None
         What the sensors find that is not on the map is planned round, when they are told of.
+    caution : CautionConfig, optional
+    blockades : BlockadeConfig, optional
     """
 
     def __init__(
@@ -54,12 +63,14 @@ class Mission:
         controller: Controller,
         home: Destination | None = None,
         surroundings: Surroundings | None = None,
+        caution: CautionConfig | None = None,
+        blockades: BlockadeConfig | None = None,
     ) -> None:
         self.config = config
         self.planner = planner
         self.controller = controller
         self.home = home
-        self._ways = WayFinder(planner, surroundings)
+        self._ways = WayFinder(planner, surroundings, caution, blockades)
         self._readings: Readings | None = None
         self._state = MissionState.IDLE
         self._tour = Tour(())
@@ -71,19 +82,26 @@ class Mission:
         self._lost = LostWatch()
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
         self._progress = ProgressWatch()
-        self._look = LookAround(config.replan_after)
-        self._marks = Marks()
+        self._look = LookAround(_LOOK_PAUSE_S)
         self._leg = Leg(config.replan_after)
+        self._saved_s = 0.0  # of the time that the stops so far were given
 
     @property
     def is_busy(self) -> bool:
         """Whether a mission is under way."""
         return not self._state.is_final
 
-    def configure(self, config: MissionConfig, planner: Planner) -> None:
+    def configure(
+        self,
+        config: MissionConfig,
+        planner: Planner,
+        caution: CautionConfig | None = None,
+        blockades: BlockadeConfig | None = None,
+    ) -> None:
         """Use other settings from now on; a mission under way goes on."""
         self.config = config
-        self.planner = self._ways.planner = planner
+        self.planner = planner
+        self._ways.configure(planner, caution, blockades)
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
 
     def start(self, stops: tuple[Destination, ...], return_home: bool = False) -> None:
@@ -120,8 +138,8 @@ class Mission:
         self._tour = tour
         self._message, self._paused = '', False
         self._lost.restart()
-        self._marks.clear()
         self._begin_leg()
+        self._saved_s = 0.0
         self._state = MissionState.PLANNING
 
     def check(self, tour: Tour) -> None:
@@ -216,6 +234,8 @@ class Mission:
         velocity: Velocity | None = None
         if self.is_busy and not self._paused:
             velocity = self._advance(situation, elapsed)
+            if velocity is not None and situation.pose is not None:
+                velocity = self._ways.caution.slowed(velocity, situation.pose, situation.stamp)
         if velocity is None:
             velocity = self.controller.halt(min(elapsed, _LONGEST_STEP_S))
         status = self.status
@@ -260,13 +280,16 @@ class Mission:
             self._progress.restart()
             return velocity
         leg.begun = True
-        if leg.taken_s > self.config.stop_limit:
-            self._miss(f'not reached within {self.config.stop_limit:.0f} s')
+        limit = self.config.stop_limit + self._saved_s
+        if leg.taken_s > limit:
+            self._miss(f'not reached within {limit:.0f} s')
             return None
         if leg.path is None and not self._plan(situation, pose, stop):
             return None
         if self._ways.is_approached(situation.stamp):
             return None
+        if leg.retreat_until:
+            return self._make_way(situation, pose, dt)
         self._look_ahead(situation, pose, stop)
         drive = self.controller.step(pose, dt)
         leg.distance_left = drive.distance_left
@@ -312,13 +335,12 @@ class Mission:
         self._state = MissionState.PLANNING
         if situation.stamp < self._leg.plan_again:
             return False
-        discs = self._marks.discs(situation.stamp)
         try:
-            path = self._ways.way(pose, stop, discs)
+            path = self._ways.way(pose, stop, situation.stamp)
+        except NoWayError as error:
+            self._miss(str(error))
+            return False
         except PlanningError as error:
-            if discs:
-                self._marks.clear()  # better wait before it than have no way at all
-                return self._plan(situation, pose, stop)
             self._leg.plan_tries += 1
             if self._leg.plan_tries >= _PLAN_TRIES:
                 self._miss(str(error))
@@ -333,12 +355,10 @@ class Mission:
 
     def _look_ahead(self, situation: Situation, pose: Pose2, stop: Destination) -> None:
         """Take another way where something was found on this one."""
-        leg, discs = self._leg, self._marks.discs(situation.stamp)
+        leg = self._leg
         if leg.path is None:
             return
-        path = self._ways.other_way(
-            situation.stamp, pose, stop, leg.path, leg.distance_left, discs
-        )
+        path = self._ways.other_way(situation.stamp, pose, stop, leg.path, leg.distance_left)
         if path is None:
             return
         self._events.append(f'something in the way: round it in {path.length:.1f} m')
@@ -395,15 +415,59 @@ class Mission:
     def _around(self, situation: Situation, pose: Pose2, stop: Destination) -> None:
         """Look for a way around what is in the way; keep waiting before it if there is none."""
         mark = disc_ahead(situation, pose, self.planner.footprint_radius)
+        self._ways.meet(mark, situation.stamp, self.config.mark_time)
         try:
-            path = self._ways.way(pose, stop, (*self._marks.discs(situation.stamp), mark))
+            path = self._ways.way_around(pose, stop, situation.stamp)
         except PlanningError as error:
-            self._events.append(f'no way around ({error}): waiting')
+            if not self._retreats(situation, pose, mark):
+                self._wait_before(situation, pose, stop, error)
             return
-        self._marks.add(mark, situation.stamp + nanoseconds(self.config.mark_time))
         self._follow(path)
         self._state = MissionState.BLOCKED
         self._events.append(f'a way around of {path.length:.1f} m')
+
+    def _retreats(self, situation: Situation, pose: Pose2, mark: Disc) -> bool:
+        """Begin to make way for who stands in the way; False: it cannot, or has just done so."""
+        leg = self._leg
+        if leg.path is None or situation.stamp < leg.retreat_again:
+            return False
+        path = self._ways.refuge(pose, mark, leg.path, leg.distance_left)
+        if path is None:
+            return False
+        self._follow(path)
+        self._state = MissionState.BLOCKED
+        leg.retreat_until = situation.stamp + nanoseconds(_RETREAT_S)
+        leg.retreat_again = situation.stamp + nanoseconds(_RETREAT_AGAIN_S)
+        leg.retreated = False
+        self._events.append(f'making way: {path.length:.1f} m aside')
+        return True
+
+    def _make_way(self, situation: Situation, pose: Pose2, dt: float) -> Velocity | None:
+        """Drive out of somebody's way, stand there for a while, then plan anew."""
+        leg = self._leg
+        if situation.stamp >= leg.retreat_until:
+            leg.retreat_until, leg.path = 0, None
+            return None
+        if leg.retreated:
+            return None
+        drive = self.controller.step(pose, dt)
+        if drive.arrived:
+            leg.retreated = True
+            leg.retreat_until = situation.stamp + nanoseconds(_ASIDE_S)
+        return drive.velocity
+
+    def _wait_before(
+        self, situation: Situation, pose: Pose2, stop: Destination, error: PlanningError
+    ) -> None:
+        """Keep waiting before what is in the way; give the stop up if it is there to stay."""
+        try:
+            self._ways.lasting_way(pose, stop, situation.stamp)
+        except NoWayError as blocked:
+            self._miss(str(blocked))
+        except PlanningError:
+            pass
+        else:
+            self._events.append(f'no way around ({error}): waiting')
 
     def _arrive(self, stop: Destination) -> None:
         self._tour = self._tour.arrive()
@@ -437,6 +501,8 @@ class Mission:
 
     def _begin_leg(self) -> None:
         """Forget what concerned one stop only."""
+        self._ways.forget()
+        self._saved_s += self.config.stop_limit - self._leg.taken_s
         self._leg = Leg(self.config.replan_after)
         self._stay = None
         self._progress.restart()

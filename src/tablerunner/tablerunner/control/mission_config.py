@@ -66,28 +66,32 @@ class MissionConfig(Config):
         dynamic=True,
     )
     replan_after: float = parameter(
-        8.0,
+        5.0,
         description='Blocked for longer: look for a way around',
         unit='s',
         above=0.0,
         dynamic=True,
     )
     give_up_after: float = parameter(
-        90.0,
+        180.0,
         description='Time blocked on the way to one stop, in all, until it is missed',
         unit='s',
         above=0.0,
         dynamic=True,
     )
     mark_time: float = parameter(
-        45.0,
-        description='How long a place counts as blocked after a plan around it',
+        20.0,
+        description='How long a place counts as blocked after a plan around it, the first time',
         unit='s',
         above=0.0,
         dynamic=True,
     )
     stop_limit: float = parameter(
-        300.0, description='Time for the way to one stop', unit='s', above=0.0, dynamic=True
+        220.0,
+        description='Time for the way to one stop; what earlier stops did not need is added',
+        unit='s',
+        above=0.0,
+        dynamic=True,
     )
     off_path: float = parameter(
         0.5, description='Plan anew when farther from the path', unit='m', above=0.0, dynamic=True

@@ -13,7 +13,7 @@ from scipy.sparse import csgraph
 from tablerunner.config import Config, parameter
 from tablerunner.control.floor_map import Disc, FloorMap
 from tablerunner.control.path import Path
-from tablerunner.errors import ConfigError, PlanningError
+from tablerunner.errors import ConfigError, NoWayError, PlanningError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Vector
 
@@ -129,7 +129,8 @@ class Planner:
         Raises
         ------
         PlanningError
-            The goal is outside the room, in or too near an obstacle, or no way leads there.
+            The goal is outside the room, in or too near an obstacle; `NoWayError`: no way leads
+            there.
         """
         if not start.is_finite:
             raise PlanningError('the start is not a finite position and heading')
@@ -141,9 +142,7 @@ class Planner:
         snapped = 1 if first == floor.cell(start.x, start.y) else 0
         last = floor.cell(goal.x, goal.y)
         if not allowed[last]:
-            last = self._nearest_allowed(
-                floor, allowed, goal, 2 * floor.resolution, 'something stands at the goal'
-            )
+            last = self._goal_cell(floor, allowed, goal)
         cells = self._search(floor, allowed, first, last, goal)
         points = np.column_stack(
             [
@@ -179,6 +178,16 @@ class Planner:
             floor, allowed, start, _SNAP_M, 'the robot stands where there is no floor to drive on'
         )
 
+    def _goal_cell(
+        self, floor: FloorMap, allowed: NDArray[np.bool_], goal: Pose2
+    ) -> tuple[int, int]:
+        try:
+            return self._nearest_allowed(
+                floor, allowed, goal, 2 * floor.resolution, 'something stands at the goal'
+            )
+        except PlanningError as error:
+            raise NoWayError(str(error)) from None
+
     def _nearest_allowed(
         self,
         floor: FloorMap,
@@ -213,7 +222,7 @@ class Planner:
             where = f'({goal.x:.2f}, {goal.y:.2f})'
             if floor.outside[last] and not floor.outside[first]:
                 raise PlanningError(f'the goal {where} is outside the room')
-            raise PlanningError(f'no way leads to the goal {where}')
+            raise NoWayError(f'no way leads to the goal {where}')
         chain = [end]
         while chain[-1] != start:
             chain.append(int(previous[chain[-1]]))

@@ -331,6 +331,8 @@ class SafetyStop:
         beside = np.maximum(beside, config.creep_speed)
         alongside = heard.beside & (heard.points[:, 0] > -config.footprint_radius)
         speeds = np.minimum(speeds, np.where(alongside, beside, np.inf))
+        tight = (gaps < config.side_margin) & (heard.points[:, 0] > 0.1 * gaps)
+        speeds = np.minimum(speeds, np.where(tight, config.creep_speed, np.inf))
         best = int(np.argmin(speeds))
         if not np.isfinite(speeds[best]):
             return math.inf, math.inf, None, ''
@@ -340,27 +342,34 @@ class SafetyStop:
     def _free_ways(self, points: Vector, wanted: Velocity) -> Vector:
         """Return how far the hull can go along the wanted arc before it meets each point [m].
 
-        The hull is a disc grown by the side margin. A point already inside the grown disc counts
-        only if the robot moves towards it: a wall alongside must not hold a robot that leaves it.
+        The hull is a disc grown by the side margin. For a point already inside the grown disc the
+        hull itself counts, and only if the robot moves towards it: a wall alongside must neither
+        hold a robot that leaves it nor one that just fits between two of them.
         """
-        radius = self.config.footprint_radius + self.config.side_margin
+        hull = self.config.footprint_radius
+        way = self._way(points, wanted, hull + self.config.side_margin)
         gap = np.linalg.norm(points, axis=1)
+        close = gap < hull + self.config.side_margin
+        if close.any():
+            way[close] = self._way(points[close], wanted, np.minimum(hull, gap[close] - 1e-6))
+        return np.where(close & (points[:, 0] <= 0.1 * gap), np.inf, way)
+
+    def _way(self, points: Vector, wanted: Velocity, radius: Vector | float) -> Vector:
         curvature = wanted.angular_rad_s / wanted.linear_m_s
-        way = _straight(points, radius)
         if abs(curvature) >= _LEAST_CURVATURE:
             way = _along_arc(points, radius, curvature)
-        way = np.where(way >= 0.0, way, np.inf)
-        leaving = points[:, 0] <= 0.1 * gap
-        return np.where(gap < radius, np.where(leaving, np.inf, 0.0), way)
+        else:
+            way = _straight(points, radius)
+        return np.where(way >= 0.0, way, np.inf)
 
 
-def _straight(points: Vector, radius: float) -> Vector:
+def _straight(points: Vector, radius: Vector | float) -> Vector:
     """Return how far a disc goes straight on until it meets each point [m]; < 0: behind it."""
     room = radius**2 - points[:, 1] ** 2
     return np.asarray(np.where(room > 0.0, points[:, 0] - np.sqrt(np.maximum(room, 0.0)), np.inf))
 
 
-def _along_arc(points: Vector, radius: float, curvature: float) -> Vector:
+def _along_arc(points: Vector, radius: Vector | float, curvature: float) -> Vector:
     """Return how far a disc goes along an arc, at most half a turn, until it meets each point.
 
     The arc's centre, the point and the disc's centre at the touch make a triangle of which all
@@ -378,4 +387,10 @@ def _along_arc(points: Vector, radius: float, curvature: float) -> Vector:
 
 def _times(config: SafetyConfig) -> EchoTimes:
     near_m = config.footprint_radius + config.near
-    return EchoTimes(config.hold_time, config.hold_time_near, config.memory_time, near_m)
+    return EchoTimes(
+        config.hold_time,
+        config.hold_time_near,
+        config.memory_time,
+        near_m,
+        config.footprint_radius,
+    )

@@ -19,6 +19,7 @@ from tablerunner.config import Config, parameter
 from tablerunner.control.floor_map import FloorMap
 from tablerunner.control.fuzzy.readings import Readings
 from tablerunner.control.path import Path
+from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import seconds
 
@@ -29,6 +30,8 @@ _SPACING_M = 0.1
 _ELSEWHERE = 0.15
 _BLUR_M = 0.08  # places are found wider than they are
 _COMPARED_S = 0.4  # readings farther apart than this are not compared
+_AHEAD_RAD = math.radians(60.0)
+_TURNED_RAD = 0.1
 _RUNNING_M_S = 2.5  # nearer by more: another thing than before
 
 
@@ -51,6 +54,12 @@ class SurroundingsConfig(Config):
         unit='m',
         low=0.0,
     )
+    foreign: float = parameter(
+        0.25,
+        description='The robot is careful of echoes that are farther from all on the map',
+        unit='m',
+        low=0.0,
+    )
     passed: float = parameter(
         0.5, description='What speaks against a place that sound has passed', low=0.0
     )
@@ -67,7 +76,7 @@ class SurroundingsConfig(Config):
         15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
     shy: float = parameter(
-        1.2, description='Who comes nearer than this by himself is waited for', unit='m', low=0.0
+        0.6, description='Who comes nearer than this by himself is waited for', unit='m', low=0.0
     )
     walking: float = parameter(
         0.35, description='Coming nearer faster than this is walking', unit='m/s', above=0.0
@@ -114,8 +123,15 @@ class Surroundings:
         self._approached: int | None = None
         self._floor: FloorMap | None = self._map  # None: to be made anew
 
-    def hear(self, readings: Readings, pose: Pose2, stamp: int) -> None:
-        """Take what is new in `readings`; `pose` is base_link in map at `stamp` [ns]."""
+    def hear(self, readings: Readings, pose: Pose2, stamp: int) -> tuple[float, ...]:
+        """Take what is new in `readings`; `pose` is base_link in map at `stamp` [ns].
+
+        Returns
+        -------
+        tuple of float
+            Distances of new echoes from ahead that the map does not explain [m].
+        """
+        unknown: list[float] = []
         dt = 0.0 if self._last is None else max(seconds(stamp - self._last), 0.0)
         self._last = stamp
         self._fade(dt)
@@ -127,9 +143,15 @@ class Surroundings:
             self._ages[sensor] = age
             if is_new and age < 0.5 and not math.isnan(distance):
                 at = pose @ self._mounts[sensor]
-                if self._add(distance, at):
+                known_m = self._add(distance, at)
+                if known_m > self.config.explained:
                     self._compare(sensor, distance, at, stamp)
+                # Nearer to what is on the map a pose that is off may be the reason.
+                is_ahead = abs(self._mounts[sensor].heading) < _AHEAD_RAD
+                if known_m > self.config.foreign and is_ahead:
+                    unknown.append(distance)
                 self._before[sensor] = stamp, distance, at
+        return tuple(unknown)
 
     def _compare(self, sensor: int, distance: float, at: Pose2, stamp: int) -> None:
         """Take note of what comes nearer by itself, faster than the robot moves towards it."""
@@ -139,6 +161,8 @@ class Surroundings:
         apart_s = seconds(stamp - before[0])
         if not 0.0 < apart_s <= _COMPARED_S:
             return
+        if abs(difference(at.heading, before[2].heading)) > _TURNED_RAD:
+            return  # the cone has swept to another thing
         cos, sin = math.cos(at.heading), math.sin(at.heading)
         own = (at.x - before[2].x) * cos + (at.y - before[2].y) * sin
         speed = (before[1] - distance - own) / apart_s
@@ -159,8 +183,11 @@ class Surroundings:
         self._fade_s = 0.0
         self._floor = None
 
-    def _add(self, distance: float, at: Pose2) -> bool:
-        """Weigh one reading, `at` is the sensor in map; return whether the map lacks it."""
+    def _add(self, distance: float, at: Pose2) -> float:
+        """Weigh one reading, `at` is the sensor in map.
+
+        Returns how far what was heard is from anything on the map [m]; 0: nothing was heard.
+        """
         config, floor = self.config, self._map
         far = min(distance, config.reach)
         row, column = floor.cell(at.x, at.y)
@@ -169,7 +196,7 @@ class Surroundings:
         columns = slice(max(column - half, 0), max(column + half + 1, 0))
         evidence = self._evidence[rows, columns]
         if not evidence.size:
-            return False
+            return 0.0
         xs = floor.origin[0] + floor.resolution * np.arange(
             columns.start, columns.start + evidence.shape[1]
         )
@@ -187,17 +214,18 @@ class Surroundings:
         evidence[before] = np.maximum(evidence[before] - against, 0.0)
         self._floor = None
         if distance > config.reach:
-            return False
+            return 0.0
         arc = in_cone & (np.abs(away - distance) <= _ARC_M)
         known = floor.distance[rows, columns][arc]
-        if not known.size or float(known.min()) <= config.explained:
-            return False
+        known_m = float(known.min()) if known.size else 0.0
+        if known_m <= config.explained:
+            return known_m
         # Sound is strongest in the middle of the cone. At its edges an echo rather speaks against
         # something: once is enough to explain it.
         weight = min(1.0, config.sharp / max(distance, 1e-6))
         share = (1.0 - aside[arc] ** 2) ** 2 - _ELSEWHERE
         evidence[arc] = np.clip(evidence[arc] + weight * share, 0.0, config.most)
-        return True
+        return known_m
 
     @property
     def found(self) -> NDArray[np.bool_]:
