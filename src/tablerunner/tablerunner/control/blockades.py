@@ -13,6 +13,8 @@ from tablerunner.config import Config, parameter
 from tablerunner.control.floor_map import Disc
 from tablerunner.types import nanoseconds
 
+_ONCE_NS = nanoseconds(8.0)
+
 
 @dataclass(frozen=True)
 class BlockadeConfig(Config):
@@ -56,7 +58,13 @@ class Blockades:
         self._met = []
 
     def add(self, disc: Disc, stamp: int) -> None:
-        """Take note that something was in the way at `disc` at `stamp` [ns]."""
+        """Take note that something was in the way at `disc` at `stamp` [ns].
+
+        The same place again within seconds is the same time still.
+        """
+        same = self._same(disc, self._met)
+        if same and stamp - same[-1][0] < _ONCE_NS:
+            return
         self._met = [*self._remembered(stamp), (stamp, disc)]
 
     def times(self, disc: Disc, stamp: int) -> int:

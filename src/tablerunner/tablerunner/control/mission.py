@@ -24,7 +24,7 @@ from tablerunner.control.planner import Planner
 from tablerunner.control.progress import ProgressWatch
 from tablerunner.control.surroundings import Surroundings
 from tablerunner.control.tour import Tour, check_stops
-from tablerunner.control.way_finder import WayFinder
+from tablerunner.control.way_finder import WayFinder, patience
 from tablerunner.errors import MissionError, NoWayError, PlanningError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Velocity, nanoseconds, seconds
@@ -409,18 +409,28 @@ class Mission:
                 self._arrive(stop)
                 return False
             self._leg.replan_at = stuck_s + config.replan_after
-            self._around(situation, pose, stop)
+            self._around(situation, pose, stop, stuck_s)
         return True
 
-    def _around(self, situation: Situation, pose: Pose2, stop: Destination) -> None:
-        """Look for a way around what is in the way; keep waiting before it if there is none."""
+    def _around(
+        self, situation: Situation, pose: Pose2, stop: Destination, stuck_s: float
+    ) -> None:
+        """Look for a way around what is in the way; keep waiting before it if there is none.
+
+        For a long way round it is worth to wait a little: people move on. The oftener something
+        was met here, the less.
+        """
+        left = self._leg.distance_left
         mark = disc_ahead(situation, pose, self.planner.footprint_radius)
-        self._ways.meet(mark, situation.stamp, self.config.mark_time)
+        times = self._ways.meet(mark, situation.stamp, self.config.mark_time)
         try:
             path = self._ways.way_around(pose, stop, situation.stamp)
         except PlanningError as error:
             if not self._retreats(situation, pose, mark):
                 self._wait_before(situation, pose, stop, error)
+            return
+        if stuck_s < self.config.replan_after + patience(path.length - left) / times:
+            self._events.append(f'a way around of {path.length:.1f} m is long: waiting')
             return
         self._follow(path)
         self._state = MissionState.BLOCKED

@@ -99,8 +99,8 @@ class WayFinder:
         """Forget for good where something stood that was met on the way."""
         self._blockades.clear()
 
-    def meet(self, disc: Disc, stamp: int, mark_s: float) -> None:
-        """Take note of what holds the robot up.
+    def meet(self, disc: Disc, stamp: int, mark_s: float) -> int:
+        """Take note of what holds the robot up; return how often it did so at this place.
 
         Ways keep off it for `mark_s` [s] the first time, four times as long the second time, and
         so on: what was there twice is hardly somebody who walks.
@@ -108,6 +108,7 @@ class WayFinder:
         self._blockades.add(disc, stamp)
         times = self._blockades.times(disc, stamp)
         self._marks.add(disc, stamp + nanoseconds(mark_s * times**2))
+        return times
 
     def way(self, pose: Pose2, stop: Destination, stamp: int) -> Path:
         """Return a way round all that is known of; if need be, past what may have gone by now.
@@ -221,7 +222,7 @@ class WayFinder:
         if other is None:
             return None
         longer = other.length - left_m
-        patience_s = longer / _WALK_M_S if longer > _LONGER_M else 0.0
+        patience_s = patience(longer)
         on = max(path.length - left_m, 0.0)
         if _turns(pose, other, 0.0) and not _turns(pose, path, on):
             patience_s = max(patience_s, _TURN_BACK_S)
@@ -239,6 +240,11 @@ class WayFinder:
             return False
         self._turned = pose
         return True
+
+
+def patience(longer: float) -> float:
+    """Return how long to wait before a way that is longer by so much [m] is worth it [s]."""
+    return longer / _WALK_M_S if longer > _LONGER_M else 0.0
 
 
 def _turns(pose: Pose2, path: Path, arc: float) -> bool:
