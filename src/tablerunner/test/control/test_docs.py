@@ -10,6 +10,8 @@ import pytest
 from tablerunner.config import Config, parameters_of
 from tablerunner.control import (
     BatteryConfig,
+    BlockadeConfig,
+    CautionConfig,
     FollowerConfig,
     MissionConfig,
     PlannerConfig,
@@ -43,6 +45,8 @@ def expected_rows(cls: type[Config], prefix: str) -> list[str]:
         ('navigation.md', FollowerConfig, 'follower.'),
         ('navigation.md', MissionConfig, 'mission.'),
         ('navigation.md', BatteryConfig, 'battery.'),
+        ('navigation.md', BlockadeConfig, 'blockade.'),
+        ('navigation.md', CautionConfig, 'caution.'),
         ('navigation.md', SurroundingsConfig, 'surroundings.'),
         ('fuzzy.md', DetourConfig, 'detour.'),
     ],

@@ -123,6 +123,27 @@ def test_near_echo_heard_twice_is_held_longer_than_one_heard_once() -> None:
         assert echoes.heard(S(4.5)) is None
 
 
+def test_nothing_is_where_the_hull_has_been_since() -> None:
+    """An arc is wider than the thing: what of it the robot has driven over was never there."""
+    times = EchoTimes(hold_s=9.0, near_s=9.0, memory_s=9.0, near_m=0.75, hull_m=0.25)
+    echoes = EchoMemory(MOUNTS, times)
+    echoes.add(reading(1.0, 0.6), S(1.0))
+    for step in range(1, 11):
+        echoes.move(Velocity(0.6, 0.0), 0.1)
+        echoes.add(reading(1.0 + 0.1 * step, math.inf), S(1.0 + 0.1 * step))
+        echoes.forget(S(1.0 + 0.1 * step))
+        heard = echoes.heard(S(1.0 + 0.1 * step))
+        if heard is not None:
+            assert np.linalg.norm(heard.points, axis=1).min() >= 0.25 - 0.02 - 1e-9
+        if step <= 4:
+            assert heard is not None
+            assert len(heard.points) == 7  # 0.8 m ahead at first, passed at walking pace
+    close = EchoMemory(MOUNTS, times)
+    close.add(reading(1.0, 0.01), S(1.0))  # touches the sensor, which sits within the hull
+    close.forget(S(1.0))
+    assert close.heard(S(1.0)) is not None
+
+
 def test_corner_that_leaves_the_cone_is_remembered_until_the_robot_is_there() -> None:
     """Heard ahead and to the side, then passed between two cones: it still stands there."""
     echoes, now = EchoMemory(MOUNTS, EchoTimes(0.6, 0.6, 6.0, 0.75)), 1.0

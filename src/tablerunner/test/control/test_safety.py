@@ -291,6 +291,18 @@ def test_robot_beside_a_wall_may_leave_it() -> None:
     assert bench.run(3.0, Velocity(0.3, 0.3)).velocity.linear_m_s > 0.05
 
 
+def test_robot_creeps_between_two_walls_that_it_just_fits_between() -> None:
+    """0.07 m to the slanting sensors' left and right: nothing is ahead, and nothing is touched."""
+    bench = Bench()
+    side = 0.25 + 0.02 - 0.22  # from the rim, where the sensors sit, to 2 cm beside the hull
+    bench.ranges['ultrasonic_left'] = bench.ranges['ultrasonic_right'] = side
+    decision = bench.run(4.0, Velocity(0.4, 0.0))
+    assert decision.state is SafetyState.SLOW
+    assert decision.velocity.linear_m_s == pytest.approx(CONFIG.creep_speed)
+    bench.ranges['ultrasonic_front'] = 0.1  # but not into what is ahead
+    assert bench.run(1.0, Velocity(0.4, 0.0)).velocity.linear_m_s == 0.0
+
+
 def test_person_walking_up_stops_the_robot_before_he_is_there() -> None:
     """At 0.9 m/s from 2 m ahead and to the left: it stands when the person is there."""
     for sensor in ('ultrasonic_front', 'ultrasonic_left_front'):
@@ -364,11 +376,17 @@ def test_safety_config_upside_down_is_refused() -> None:
 def test_free_way_is_that_of_a_disc_moved_in_small_steps(
     x: float, y: float, linear: float, angular: float
 ) -> None:
-    """The closed forms for straight lines and arcs agree with pushing a disc along."""
+    """The closed forms for straight lines and arcs agree with pushing a disc along.
+
+    The disc is the hull with its side margin, for a point within that margin the hull itself, and
+    what remains of it for one that the hull covers.
+    """
     stop = SafetyStop(CONFIG, LIMITS, MOUNTS)
-    radius = CONFIG.footprint_radius + CONFIG.side_margin
-    if abs(math.hypot(x, y) - radius) < 5e-3:
+    hull, away = CONFIG.footprint_radius, math.hypot(x, y)
+    radius = hull + CONFIG.side_margin
+    if min(abs(away - radius), abs(away - hull)) < 5e-3:
         return
+    radius = radius if away > radius else min(hull, away - 1e-6)
     found = float(stop._free_ways(np.array([[x, y]]), Velocity(linear, angular))[0])
     along = np.arange(0.0, 4.0, 2e-3)
     turned = along * angular / linear
@@ -376,8 +394,8 @@ def test_free_way_is_that_of_a_disc_moved_in_small_steps(
     chord = along * np.sin(half) / half
     centres = np.column_stack([chord * np.cos(turned / 2), chord * np.sin(turned / 2)])
     gaps = np.hypot(*(centres - [x, y]).T)[np.abs(turned) <= math.pi]
-    if math.hypot(x, y) < radius:
-        expected = math.inf if x <= 0.1 * math.hypot(x, y) else 0.0
+    if away < hull + CONFIG.side_margin and x <= 0.1 * away:
+        expected = math.inf
     else:
         met = np.flatnonzero(gaps < radius)
         expected = float(along[met[0]]) if len(met) else math.inf
