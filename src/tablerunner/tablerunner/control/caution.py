@@ -21,7 +21,8 @@ from tablerunner.types import Vector, Velocity, seconds
 
 _SPACING_M = 0.1  # of the places that are looked at
 _SIGHT_M = 0.07  # of the samples along a line of sight
-_CLOSE_M, _CLOSE_SHARE = 0.3, 0.5  # beside who is so near it creeps
+_CLOSE_M, _CLOSE_SHARE = 0.3, 0.5  # beside who walks so near it creeps
+_WALKS_S = 5.0
 _WALL_M = 0.03  # a line of sight that comes so near to something ends there
 
 
@@ -85,6 +86,11 @@ class Caution:
         self._floor = floor
         self._radius = footprint_radius
         self._heard: list[tuple[int, float]] = []
+        self._met: int | None = None
+
+    def meet(self, stamp: int) -> None:
+        """Take note that somebody comes nearer by himself."""
+        self._met = stamp
 
     def hear(self, stamp: int, gap: float) -> None:
         """Take note of something ahead that is not on the map, `gap` [m] from the hull."""
@@ -113,11 +119,12 @@ class Caution:
             if gap < math.inf:
                 wise = largest_speed(gap, config.delay, config.deceleration, config.hidden_pace)
                 top = min(top, float(wise))
-        return max(top, self._least())
+        return max(top, self._least(stamp))
 
-    def _least(self) -> float:
+    def _least(self, stamp: int) -> float:
         """Return the speed at which the robot gets on in any case."""
-        close = any(gap < _CLOSE_M for _, gap in self._heard)
+        walks = self._met is not None and 0.0 <= seconds(stamp - self._met) < _WALKS_S
+        close = walks and any(gap < _CLOSE_M for _, gap in self._heard)
         return self.config.least_speed * (_CLOSE_SHARE if close else 1.0)
 
     def hidden_gap(self, pose: Pose2) -> float:

@@ -3,7 +3,7 @@
 A grid of evidence (Moravec and Elfes, "High resolution maps from wide angle sonar", 1985) on the
 cells of the floor map: an echo speaks for something on the arc on which it may lie, and against
 anything in the cone before it. Echoes that the map explains are left out. What is not confirmed
-is forgotten, for most of what is not on the map walks away.
+is forgotten, for most of what is not on the map walks away; what stood for a while, slowly.
 """
 
 from __future__ import annotations
@@ -75,6 +75,15 @@ class SurroundingsConfig(Config):
     fade_time: float = parameter(
         15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
+    firm: float = parameter(
+        8.0,
+        description='What was heard for so long is furniture, and forgotten slowly',
+        unit='s',
+        low=0.0,
+    )
+    firm_fade_time: float = parameter(
+        120.0, description='Time constant of forgetting furniture', unit='s', above=0.0
+    )
     shy: float = parameter(
         0.6, description='Who comes nearer than this by himself is waited for', unit='m', low=0.0
     )
@@ -116,6 +125,8 @@ class Surroundings:
     def reset(self) -> None:
         """Forget everything."""
         self._evidence = np.zeros(self._map.shape)
+        self._firm_s = np.zeros(self._map.shape)  # for how long something was heard there
+        self._heard = np.zeros(self._map.shape, dtype=bool)  # since it was last faded
         self._ages = [math.inf] * len(self._mounts)
         self._last: int | None = None
         self._fade_s = 0.0
@@ -179,7 +190,13 @@ class Surroundings:
         self._fade_s += dt
         if self._fade_s < _FADE_EVERY_S:
             return
-        self._evidence *= math.exp(-self._fade_s / self.config.fade_time)
+        config = self.config
+        slowly = self._firm_s >= config.firm
+        times = np.where(slowly, config.firm_fade_time, config.fade_time)
+        self._evidence *= np.exp(-self._fade_s / times)
+        heard_s = np.where(self._heard, self._fade_s, 0.0)
+        self._firm_s = np.where(self.found, self._firm_s + heard_s, 0.0)
+        self._heard[:] = False
         self._fade_s = 0.0
         self._floor = None
 
@@ -225,6 +242,7 @@ class Surroundings:
         weight = min(1.0, config.sharp / max(distance, 1e-6))
         share = (1.0 - aside[arc] ** 2) ** 2 - _ELSEWHERE
         evidence[arc] = np.clip(evidence[arc] + weight * share, 0.0, config.most)
+        self._heard[rows, columns] |= arc & (evidence >= config.enough)
         return known_m
 
     @property

@@ -22,7 +22,7 @@ from tablerunner.types import nanoseconds, seconds
 
 _LOOK_NS, _LOOK_AGAIN_NS = nanoseconds(0.25), nanoseconds(1.5)
 _AHEAD_M = 1.8
-_SPACE_M = 0.03
+_WITHIN_M = 0.05  # what is found is wider than it is: a way may lead so near that it seems touched
 _LONGER_M = 1.5
 _WALK_M_S = 0.4  # about the mean speed of a robot that gets on
 _MOVED_M = 0.3
@@ -77,6 +77,8 @@ class WayFinder:
         if self.surroundings is not None:
             for gap in self.surroundings.hear(readings, pose, stamp):
                 self.caution.hear(stamp, gap)
+            if self.surroundings.is_approached(stamp):
+                self.caution.meet(stamp)
 
     def is_approached(self, stamp: int) -> bool:
         """Return whether to wait for somebody who has just come nearer by himself.
@@ -211,7 +213,7 @@ class WayFinder:
         if found is None or stamp < self._look_at:
             return None
         self._look_at = stamp + _LOOK_NS
-        radius = self.planner.footprint_radius + _SPACE_M
+        radius = self.planner.footprint_radius - _WITHIN_M
         if not found.is_in_the_way(path, max(path.length - left_m, 0.0), _AHEAD_M, radius):
             self._barred_since = None
             return None

@@ -72,12 +72,15 @@ def test_what_was_heard_counts_for_its_time_only() -> None:
     assert caution.top_speed(pose, NOW + nanoseconds(CONFIG.hold + 0.01)) == math.inf
 
 
-def test_least_speed_is_kept_and_halved_right_beside() -> None:
+def test_least_speed_is_kept_and_halved_right_beside_somebody_who_walks() -> None:
     caution = Caution(floor(), RADIUS)
     pose = Pose2(2.0, 2.0, 0.0)
     caution.hear(NOW, 0.31)
     assert caution.top_speed(pose, NOW) == CONFIG.least_speed
     caution.hear(NOW, 0.1)
+    assert caution.top_speed(pose, NOW) == CONFIG.least_speed
+    caution.meet(NOW - nanoseconds(4.9))
+    assert caution.top_speed(pose, NOW + nanoseconds(0.2)) == CONFIG.least_speed
     assert caution.top_speed(pose, NOW) == 0.5 * CONFIG.least_speed
 
 

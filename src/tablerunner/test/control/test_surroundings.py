@@ -101,6 +101,24 @@ def test_what_is_not_looked_at_fades() -> None:
     assert not len(listener.places())
 
 
+def test_furniture_is_forgotten_slowly_but_at_once_when_it_has_gone() -> None:
+    config = SurroundingsConfig()
+    at, away = Pose2(2.0, 2.0, 0.0), Pose2(1.0, 2.0, math.pi)
+    longest = config.firm_fade_time * math.log(config.most / config.enough)
+    listener = Listener(room(CHAIR), room(), 1)
+    listener.stand(at, config.firm + 3.0)  # heard in every of these seconds
+    listener.turn_to(room())
+    listener.stand(away, 0.5 * longest)
+    assert len(listener.places())
+    listener.stand(at, 5.0)
+    assert not len(listener.places())
+    again = Listener(room(CHAIR), room(), 1)
+    again.stand(at, config.firm + 3.0)
+    again.turn_to(room())
+    again.stand(away, 1.1 * longest)
+    assert not len(again.places())
+
+
 def test_floor_and_path_show_what_was_found() -> None:
     listener = Listener(room(CHAIR), room(), 1)
     assert not listener.found.is_in_the_way(PATH, 0.0, 4.0, 0.28)
