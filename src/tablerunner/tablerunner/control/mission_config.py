@@ -87,7 +87,7 @@ class MissionConfig(Config):
         dynamic=True,
     )
     stop_limit: float = parameter(
-        220.0,
+        300.0,
         description='Time for the way to one stop; what earlier stops did not need is added',
         unit='s',
         above=0.0,
