@@ -1,0 +1,97 @@
+"""A device's ranges in the node's own thread, and how the device does on /diagnostics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from rclpy.node import Node
+
+from tablerunner.errors import ConfigError
+from tablerunner.types import RangeSample, Refusal
+from tablerunner.uwb.device import DeviceConfig, DeviceReader, LinkState, build_session
+from tablerunner_ros.diagnostics import ERROR, WARN, Report
+
+STILL_FACTOR = 1.5
+"""Of the interval of a tag that stands still: silence up to this is no error."""
+
+
+class DeviceInput:
+    """Reads a device beside the executor, which takes what came when it is woken.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Wakes for what comes.
+    config : DeviceConfig
+        `ConfigError` where it cannot be used.
+    anchor_ids : sequence of str
+        Names of the anchors in the map.
+    on_ranges, on_refusal : callable
+        Called in the executor's thread, with the ranges of one read and with each refusal.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        config: DeviceConfig,
+        anchor_ids: Sequence[str],
+        on_ranges: Callable[[Sequence[RangeSample]], None],
+        on_refusal: Callable[[Refusal], None],
+    ) -> None:
+        try:
+            self._session = build_session(config, anchor_ids)
+        except ConfigError as error:
+            raise error.located(f'parameters of {node.get_fully_qualified_name()}') from None
+        self._device = f'{config.device} on {self._session.name}'
+        self._on_ranges = on_ranges
+        self._on_refusal = on_refusal
+        self._logger = node.get_logger()
+        self._logged = ''
+        guard = node.create_guard_condition(self._take)
+        self._reader = DeviceReader(self._session, guard.trigger)
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._reader.start()
+
+    def stop(self) -> None:
+        """End the reading; nothing is called any more."""
+        self._reader.stop()
+
+    @property
+    def still_silence_s(self) -> float:
+        """Silence that is to be expected of a tag that stands still [s]; 0: it says nothing."""
+        interval_ms = self._session.health.facts.get('update_interval_still_ms', 0)
+        return STILL_FACTOR * float(interval_ms) / 1000.0
+
+    def describe(self, report: Report) -> None:
+        """Add how the device does to a report, and log it when that has changed."""
+        self._take()
+        health = self._session.health
+        report.values |= {
+            'device': self._device,
+            'device state': health.status,
+            'device opened': str(health.opened),
+            'device failures': str(health.failures),
+            'device last failure': health.last_failure or 'none',
+            'device bytes': str(health.bytes_read),
+            'device frames': str(health.frames),
+            'device stamps': health.stamps,
+            **{f'device {name}': str(value) for name, value in health.facts.items()},
+        }
+        if self._reader.dropped:
+            report.values['device reads dropped'] = str(self._reader.dropped)
+        words = health.words
+        if words:
+            calm = health.link is LinkState.ENDED or (not health.failures and not health.trouble)
+            report.add(WARN if calm else ERROR, f'{self._device}: {words}')
+        if words != self._logged:
+            self._logged = words
+            self._logger.info(f'{self._device}: {words or "reads ranges"}')
+
+    def _take(self) -> None:
+        for batch in self._reader.take():
+            for refusal in batch.refusals:
+                self._on_refusal(refusal)
+            if batch.ranges:
+                self._on_ranges(batch.ranges)
