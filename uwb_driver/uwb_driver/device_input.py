@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 
 from rclpy.node import Node
@@ -10,6 +11,8 @@ from tablerunner.errors import ConfigError
 from tablerunner.types import RangeSample, Refusal
 from tablerunner.uwb.device import DeviceConfig, DeviceReader, LinkState, build_session
 from tablerunner_ros.diagnostics import ERROR, WARN, Report
+
+_NUMBER = re.compile(r'\d+')
 
 STILL_FACTOR = 1.5
 """Of the interval of a tag that stands still: silence up to this is no error."""
@@ -85,9 +88,13 @@ class DeviceInput:
         if words:
             calm = health.link is LinkState.ENDED or (not health.failures and not health.trouble)
             report.add(WARN if calm else ERROR, f'{self._device}: {words}')
-        if words != self._logged:
-            self._logged = words
-            self._logger.info(f'{self._device}: {words or "reads ranges"}')
+        told = _NUMBER.sub('', words)  # counting on is no news
+        if told != self._logged:
+            self._logged = told
+            if words:
+                self._logger.warning(f'{self._device}: {words}')
+            else:
+                self._logger.info(f'{self._device}: reads ranges')
 
     def _take(self) -> None:
         for batch in self._reader.take():

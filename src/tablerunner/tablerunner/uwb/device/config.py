@@ -23,6 +23,7 @@ class SerialConfig(Config):
         unit='bit/s',
         description='Speed of the port; 0: 115200 for dwm1001, 921600 for linktrack',
         low=0,
+        high=12_000_000,
     )
 
 

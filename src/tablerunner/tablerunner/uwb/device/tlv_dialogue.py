@@ -31,7 +31,7 @@ class _Request(Enum):
     CONFIGURATION = b'\x08\x00'  # dwm_cfg_get
     STATUS = b'\x32\x00'  # dwm_status_get
     LOCATION = b'\x0c\x00'  # dwm_loc_get
-    LEAVE_SHELL = b'quit\r'
+    LEAVE_SHELL = b'\rquit\r'  # what was sent before stands in its line
 
 
 class TlvDialogue(Dialogue):

@@ -53,7 +53,7 @@ class EmulatedDwm1001:
         self._last = b''
         self._next = now + self.moving_s
         self._ready = False
-        self.measured_at = now
+        self.measured = []
 
     def hear(self, data, now):
         """Return what it answers at once."""
@@ -76,11 +76,11 @@ class EmulatedDwm1001:
         """Return what it says by itself."""
         if now < self._next:
             return b''
-        self._next = now + (self.moving_s if self.moves else self.still_s)
+        self._next = max(self._next, now - 0.1) + (self.moving_s if self.moves else self.still_s)
         if not self.in_network:
             return b''
         self._ready = True
-        self.measured_at = now
+        self.measured.append(now)
         if not (self.shell and self.lines):
             return b''
         write = lec_line if self.lines == b'lec' else les_line
