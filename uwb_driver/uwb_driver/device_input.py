@@ -1,4 +1,4 @@
-"""A device's ranges in the node's own thread, and how the device does on /diagnostics."""
+"""A device beside the executor, and how it does on /diagnostics."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from rclpy.node import Node
 
 from tablerunner.errors import ConfigError
 from tablerunner.types import RangeSample, Refusal
-from tablerunner.uwb.device import DeviceConfig, DeviceReader, LinkState, build_session
+from tablerunner.uwb.device import Batch, DeviceConfig, DeviceReader, LinkState, build_session
 from tablerunner_ros.diagnostics import ERROR, WARN, Report
+
+Results = Sequence[RangeSample | Refusal]
 
 _NUMBER = re.compile(r'\d+')
 
@@ -19,7 +21,7 @@ STILL_FACTOR = 1.5
 
 
 class DeviceInput:
-    """Reads a device beside the executor, which takes what came when it is woken.
+    """Reads a device in a thread, from which its ranges leave; what follows is the executor's.
 
     Parameters
     ----------
@@ -29,8 +31,10 @@ class DeviceInput:
         `ConfigError` where it cannot be used.
     anchor_ids : sequence of str
         Names of the anchors in the map.
-    on_ranges, on_refusal : callable
-        Called in the executor's thread, with the ranges of one read and with each refusal.
+    publish : callable
+        Called in the thread with what one read brought; returns what became of it.
+    follow : callable
+        Called in the executor's thread with that, a moment later.
     """
 
     def __init__(
@@ -38,20 +42,19 @@ class DeviceInput:
         node: Node,
         config: DeviceConfig,
         anchor_ids: Sequence[str],
-        on_ranges: Callable[[Sequence[RangeSample]], None],
-        on_refusal: Callable[[Refusal], None],
+        publish: Callable[[Batch], Results],
+        follow: Callable[[Results], None],
     ) -> None:
         try:
             self._session = build_session(config, anchor_ids)
         except ConfigError as error:
             raise error.located(f'parameters of {node.get_fully_qualified_name()}') from None
         self._device = f'{config.device} on {self._session.name}'
-        self._on_ranges = on_ranges
-        self._on_refusal = on_refusal
+        self._follow = follow
         self._logger = node.get_logger()
         self._logged = ''
         guard = node.create_guard_condition(self._take)
-        self._reader = DeviceReader(self._session, guard.trigger)
+        self._reader = DeviceReader(self._session, publish, guard.trigger)
 
     def start(self) -> None:
         """Begin to read."""
@@ -97,8 +100,5 @@ class DeviceInput:
                 self._logger.info(f'{self._device}: reads ranges')
 
     def _take(self) -> None:
-        for batch in self._reader.take():
-            for refusal in batch.refusals:
-                self._on_refusal(refusal)
-            if batch.ranges:
-                self._on_ranges(batch.ranges)
+        for results in self._reader.take():
+            self._follow(results)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -19,7 +19,7 @@ from tablerunner.uwb import (
     RangerConfig,
 )
 from tablerunner.uwb.device import EXCHANGES as FROM_EXCHANGES
-from tablerunner.uwb.device import DeviceConfig
+from tablerunner.uwb.device import Batch, DeviceConfig
 from tablerunner_interfaces.msg import UwbAnchorArray, UwbExchange, UwbRange
 from tablerunner_ros.clocks import now_ns
 from tablerunner_ros.conversions.anchors import anchors_to_message
@@ -31,7 +31,7 @@ from tablerunner_ros.parameters import declare_config
 from tablerunner_ros.qos import qos_for
 from tablerunner_ros.spin import spin_node
 from tablerunner_ros.stamps import FUTURE, StampCheck, StampConfig
-from uwb_driver.device_input import DeviceInput
+from uwb_driver.device_input import DeviceInput, Results
 from uwb_driver.health import describe_anchors
 from uwb_driver.params import UwbDriverConfig
 
@@ -56,6 +56,7 @@ class UwbDriver(Node):
         ranger = declare_config(self, RangerConfig, on_change=self._configure_ranger)
         positioner = declare_config(self, PositionerConfig, on_change=self._configure_positioner)
         self._ranger = Ranger(ranger)
+        self._changing = threading.Lock()  # the ranger: a device's ranges come in another thread
         self._positioner = Positioner(positioner, ranger.anchors)
         health = declare_config(self, AnchorHealthConfig, on_change=self._configure_health)
         self._watch = AnchorWatch(health, ranger.anchor_ids, self._source == DEVICE_SOURCE)
@@ -84,7 +85,7 @@ class UwbDriver(Node):
             )
         else:
             self._device = DeviceInput(
-                self, device, ranger.anchor_ids, self._on_ranges, self._diagnostics.refuse
+                self, device, ranger.anchor_ids, self._on_device, self._after_device
             )
             self._device.start()
 
@@ -100,21 +101,26 @@ class UwbDriver(Node):
         self._publish(result)
         self._follow(result)
 
-    def _on_ranges(self, samples: Sequence[RangeSample]) -> None:
-        taken = []
-        for sample in samples:
-            result: RangeSample | Refusal
+    def _on_device(self, batch: Batch) -> Results:
+        """Publish what a device brought, in the thread that reads it; return what came of it."""
+        results: list[RangeSample | Refusal] = list(batch.refusals)
+        for sample in batch.ranges:
             if self._stamps.is_future(sample.stamp):
-                result = Refusal(sample.stamp, DEVICE_SOURCE, sample.anchor_id, FUTURE)
-            else:
+                results.append(Refusal(sample.stamp, DEVICE_SOURCE, sample.anchor_id, FUTURE))
+                continue
+            with self._changing:
                 result = self._ranger.take(sample)
+            if isinstance(result, RangeSample):
+                self._publish(result)
+            results.append(result)
+        return results
+
+    def _after_device(self, results: Results) -> None:
+        for result in results:
             if isinstance(result, Refusal):
                 self._diagnostics.refuse(result)
-                continue
-            self._publish(result)
-            taken.append(result)
-        for result in taken:
-            self._follow(result)
+            else:
+                self._follow(result)
 
     def _publish(self, result: RangeSample) -> None:
         fill_range(self._range, result)
@@ -136,7 +142,8 @@ class UwbDriver(Node):
                 self._watch.add_fix(self._positioner.last)
 
     def _configure_ranger(self, config: RangerConfig) -> None:
-        self._ranger.configure(config)
+        with self._changing:
+            self._ranger.configure(config)
 
     def _configure_positioner(self, config: PositionerConfig) -> None:
         self._positioner.config = config

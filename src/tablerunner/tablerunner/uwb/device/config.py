@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 from dataclasses import dataclass
 
 from tablerunner.config import Config, parameter
@@ -140,6 +141,8 @@ class DeviceConfig(Config):
             )
         if self.device == 'udp' and not self.udp.port:
             raise ConfigError('udp.port', 0, 'a port from 1 to 65535 for device udp')
+        if self.udp.address and not _is_ipv4(self.udp.address):
+            raise ConfigError('udp.address', self.udp.address, 'an IPv4 address, or nothing')
         if self.device == 'replay' and not self.replay.file:
             raise ConfigError('replay.file', '', 'the path of a capture for device replay')
         if self.reconnect.longest < self.reconnect.first:
@@ -162,3 +165,11 @@ class DeviceConfig(Config):
     def baud(self) -> int:
         """Bits a second on the line, given or the protocol's own; 0 where there is none."""
         return self.serial.baud or BAUD.get(self.protocol, 0)
+
+
+def _is_ipv4(text: str) -> bool:
+    try:
+        ipaddress.IPv4Address(text)
+    except ValueError:
+        return False
+    return True

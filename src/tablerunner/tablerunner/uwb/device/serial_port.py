@@ -70,11 +70,17 @@ class SerialPort(Source):
             if not select.select([port.fileno()], [], [], wait_s)[0]:
                 return []
             stamp = self._clock()
-            data = port.read(MOST_BYTES)
+            # Not by pyserial, which waits for the port a second time.
+            data = os.read(port.fileno(), MOST_BYTES)
+        except BlockingIOError:
+            return []
         except (OSError, TypeError, ValueError) as error:
             self.close()
             raise SourceError(f'{self.name} has gone: {_plain(error)}') from error
-        return [Arrival(stamp, data)] if data else []
+        if not data:  # ready, and nothing there
+            self.close()
+            raise SourceError(f'{self.name} has gone')
+        return [Arrival(stamp, data)]
 
     def write(self, data: bytes) -> None:
         """Send bytes; a port that takes none for a second counts as gone."""

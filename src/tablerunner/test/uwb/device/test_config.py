@@ -23,6 +23,10 @@ from tablerunner.uwb.device.config import (
         ({'device': 'dwm1001'}, "serial.port: got '', expected the path of a serial port for"),
         ({'device': 'linktrack'}, "serial.port: got '', expected the path of a serial port for"),
         ({'device': 'udp'}, 'udp.port: got 0, expected a port from 1 to 65535'),
+        (
+            {'device': 'udp', 'udp': UdpConfig(address='robot', port=9)},
+            "udp.address: got 'robot', expected an IPv4 address",
+        ),
         ({'device': 'replay'}, "replay.file: got '', expected the path of a capture"),
         (
             {'reconnect': ReconnectConfig(first=9.0)},

@@ -37,21 +37,29 @@ class Feed(Source):
         return []
 
 
+def wait_for(condition, what):
+    end = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.01)
+
+
 def reader(feed):
     parser = Udp()
     session = DeviceSession(
         feed, parser, Dialogue('udp', True), RangeMaker(parser, {}), ReconnectConfig()
     )
     told = threading.Semaphore(0)
-    return DeviceReader(session, told.release), told, session
+    return DeviceReader(session, lambda batch: batch, told.release), told, session
 
 
 def test_ranges_are_handed_over_and_told_of():
     item, told, session = reader(Feed(3))
     item.start()
-    for _ in range(3):
+    count = 0
+    while count < 3:
         assert told.acquire(timeout=5.0)
-    assert sum(len(batch.ranges) for batch in item.take()) == 3
+        count += sum(len(batch.ranges) for batch in item.take())
     assert item.take() == []
     item.stop()
     assert session.health.link is LinkState.ENDED
@@ -79,10 +87,32 @@ def test_error_nobody_foresaw_is_raised_where_it_is_taken():
 
 def test_nobody_takes_and_memory_stays_bounded():
     """The newest are kept, the lost ones counted."""
-    item, told, _ = reader(Feed(MOST_WAITING + 50))
+    feed = Feed(MOST_WAITING + 50)
+    item, told, _ = reader(feed)
     item.start()
-    for _ in range(MOST_WAITING + 50):
-        assert told.acquire(timeout=5.0)
+    wait_for(lambda: not feed.left, 'the end of the feed')
+    item.stop()
     assert len(item.take()) == MOST_WAITING
     assert item.dropped == 50
+    assert told.acquire(timeout=0.0)
+
+
+def test_what_cannot_wait_is_done_in_the_thread_that_reads():
+    """Before anybody is told of it, and its result is what is taken."""
+    parser = Udp()
+    dialogue = Dialogue('udp', True)
+    session = DeviceSession(Feed(1), parser, dialogue, RangeMaker(parser, {}), ReconnectConfig())
+    told = threading.Event()
+    threads = []
+
+    def handle(batch):
+        assert not told.is_set()
+        threads.append(threading.current_thread().name)
+        return len(batch.ranges)
+
+    item = DeviceReader(session, handle, told.set)
+    item.start()
+    assert told.wait(5.0)
+    assert item.take() == [1]
+    assert threads == ['uwb device']
     item.stop()
