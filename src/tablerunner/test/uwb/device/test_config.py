@@ -5,6 +5,7 @@ import re
 import pytest
 
 from tablerunner.errors import ConfigError
+from tablerunner.uwb.device import build
 from tablerunner.uwb.device.anchor_names import anchor_names, device_id
 from tablerunner.uwb.device.build import build_session
 from tablerunner.uwb.device.config import (
@@ -14,6 +15,7 @@ from tablerunner.uwb.device.config import (
     SerialConfig,
     UdpConfig,
 )
+from tablerunner.uwb.protocol import open_protocol
 
 
 @pytest.mark.parametrize(
@@ -99,3 +101,18 @@ def test_baud_rate_is_the_protocols_own_or_as_given():
     tlv = DeviceConfig(device='dwm1001', serial=port, dwm1001=Dwm1001Config(mode='tlv'))
     assert (tlv.baud, tlv.protocol) == (115_200, 'dwm1001_tlv')
     assert DeviceConfig(device='linktrack', serial=port.replace(baud=460_800)).baud == 460_800
+
+
+def test_serial_parser_knows_the_speed_of_the_wire(monkeypatch):
+    """Frames that come in one read are dated by it; datagrams have none."""
+    made = []
+
+    def keep(name):
+        made.append(open_protocol(name))
+        return made[-1]
+
+    monkeypatch.setattr(build, 'open_protocol', keep)
+    port = SerialConfig(port='/dev/x', baud=460_800)
+    build_session(DeviceConfig(device='linktrack', serial=port), [])
+    build_session(DeviceConfig(device='udp', udp=UdpConfig(port=9)), [])
+    assert [parser.byte_ns for parser in made] == [pytest.approx(1e10 / 460_800), 0.0]

@@ -1,6 +1,8 @@
 """A serial port over a pseudo-terminal: read, written, pulled, plugged, locked, and refused."""
 
 import errno
+import os
+import select
 import time
 
 import pytest
@@ -55,15 +57,14 @@ def test_bytes_arrive_unchanged_with_their_time(wire):
 
 def test_what_waited_before_it_was_opened_is_forgotten(wire):
     """Nobody knows when that came: as ranges of now it would be wrong."""
-    first = SerialPort(str(wire.path), 115_200)
-    first.open()
+    held = os.open(wire.path, os.O_RDWR | os.O_NOCTTY)  # a port keeps what comes while it is open
     wire.write(node_frame3([(1, 0, 1000, -80, -80)]))
-    time.sleep(0.05)
-    first.close()
+    assert select.select([held], [], [], 5.0)[0]
     port = SerialPort(str(wire.path), 115_200)
     port.open()
     assert port.read(0.1) == []
     port.close()
+    os.close(held)
 
 
 def test_unplugged_and_plugged_again(wire):

@@ -1,5 +1,7 @@
 """A session on a wire that is pulled, cut, damaged and spoken on at the wrong speed."""
 
+from typing import ClassVar
+
 import pytest
 from bench_clock import EPOCH_NS, Bench, Clock
 from device_writers import datagram, lec_line, location_answer, node_frame2, node_frame3
@@ -113,11 +115,24 @@ def test_port_that_opens_and_fails_at_once_is_backed_off():
 
 def test_half_a_frame_is_never_joined_with_another_connections():
     """Unplugged within a frame, and the rest of another after it: nothing is read of them."""
-    first = node_frame3(NODES, system_time=5)
-    other = node_frame3([(1, 0, 9999, -80, -80), *NODES[1:]], system_time=6)
+    first = node_frame3(NODES)
+    other = node_frame3([*NODES[:2], (1, 2, 9999, -80, -80)])
+    assert first[:20] == other[:20]  # joined, they would be a whole frame of the other
     made, _, clock = session([first[:20], GONE, other[20:], node_frame3(NODES)])
     ranges, _ = run(made, clock, 3.0)
     assert found(ranges) == TRUE
+
+
+def test_another_tag_may_be_plugged_in():
+    """Of two in one connection the first is taken; the next connection has its own first."""
+    one, two = (node_frame3(NODES, number=number) for number in (7, 8))
+    made, _, clock = session([one, two, GONE, two, one])
+    ranges, refusals = run(made, clock, 3.0)
+    assert [item.tag_id for item in ranges] == ['tag7'] * 3 + ['tag8'] * 3
+    assert {(item.key, item.reason) for item in refusals} == {
+        ('tag8', 'another tag'),
+        ('tag7', 'another tag'),
+    }
 
 
 def test_wrong_baud_rate_is_said_and_opened_anew():
@@ -208,7 +223,7 @@ def test_stream_that_loses_and_is_pulled_never_gives_a_wrong_range(name, data):
             reads += [frame[:at], GONE, frame[at:]]
     ends = b'\r\n' if name == 'lec' else b''
     made, _, clock = session([*reads, ends, frame, frame], make())
-    ranges, _ = run(made, clock, 12.0)
+    ranges, _ = run(made, clock, 35.0)  # six waits in a row without a frame: 31.5 s
     # A lost piece of a NodeFrame may leave a sum that is right by chance, 1 in 256: not here.
     assert found(ranges) <= true
     assert found(ranges[-len(true) :]) == true
@@ -262,3 +277,38 @@ def test_bench_of_the_other_tests_pulls_its_module():
     bench.module.reset(bench.clock.now)
     bench.run(8.0)
     assert found(bench.run(1.0)[0]) == PROTOCOLS['lec'][2]
+
+
+def test_what_is_missing_in_a_capture_is_never_joined():
+    """The rest of a frame after a lost chunk does not continue the half before it."""
+    first = node_frame3(NODES)
+    other = node_frame3([*NODES[:2], (1, 2, 9999, -80, -80)])
+
+    class Torn(Script):
+        def read(self, wait_s):
+            return [item._replace(lost=item.data == other[20:]) for item in super().read(wait_s)]
+
+    made, source, clock = session([first[:20], other[20:], first])
+    source.__class__ = Torn
+    ranges, _ = run(made, clock, 1.0)
+    assert found(ranges) == TRUE
+
+
+def test_arrivals_are_kept_as_they_came():
+    made, _, clock = session([b'ab', b'cd'])
+
+    class Keeper:
+        error = ''
+        kept: ClassVar = []
+
+        def add(self, arrival):
+            self.kept.append(arrival.data)
+
+        def close(self):
+            self.kept.append('closed')
+
+    made._capture = Keeper()
+    run(made, clock, 1.0)
+    assert made.health.facts['capture'] == 'written'
+    made.close()
+    assert Keeper.kept == [b'ab', b'cd', 'closed']

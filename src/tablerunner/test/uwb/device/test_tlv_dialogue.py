@@ -40,15 +40,19 @@ def test_still_tag_gives_no_old_range_again():
 
 
 def test_stamp_is_at_most_a_question_late():
-    """Between the ranging and one interval of questions and an answer later."""
-    bench = tlv(rate_hz=20.0)
+    """A question every 0.05 s or as soon as the last is answered, answers after 0.05 s.
+
+    So a location is announced 0.1 s after the ranging at the latest; it comes 0.05 s later still,
+    which does not count. Steps of the bench: 0.005 s.
+    """
+    bench = tlv(rate_hz=20.0, latency_s=0.05)
     bench.run(1.0)
     ranges, _ = bench.run(5.0)
     for item in ranges:
         stamp_s = (item.stamp - EPOCH_NS) / 1e9
         measured_s = max(at for at in bench.module.measured if at <= stamp_s)
-        assert stamp_s - measured_s <= 1 / 20.0 + 0.01
-    assert len(ranges) >= 4 * 48
+        assert stamp_s - measured_s <= 0.1 + 0.02
+    assert len(ranges) >= 4 * 25
 
 
 def test_late_answer_is_refused():
