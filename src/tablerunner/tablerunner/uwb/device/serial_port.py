@@ -53,12 +53,14 @@ class SerialPort(Source):
         self._port: serial.Serial | None = None
 
     def open(self) -> None:
-        """Open the port and forget what waits in its buffer: nobody knows when that came."""
+        """Open the port.
+
+        What waits in its buffer is forgotten (pyserial does so): nobody knows when that came.
+        """
         try:
             self._port = serial.Serial(
                 self.name, self._baud, timeout=0, write_timeout=WRITE_LIMIT_S, exclusive=True
             )
-            self._port.reset_input_buffer()
         except (OSError, ValueError) as error:  # SerialException is an OSError
             self.close()
             raise SourceError(f'{self.name} {_reason(error)}') from error

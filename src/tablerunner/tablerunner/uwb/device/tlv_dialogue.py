@@ -25,7 +25,9 @@ MOST_TRIES = 3
 LATE = 'answer came too late'
 
 
-class _Request(Enum):
+class Request(Enum):
+    """What the module is asked."""
+
     VERSION = b'\x15\x00'  # dwm_ver_get
     INTERVALS = b'\x04\x00'  # dwm_upd_rate_get
     CONFIGURATION = b'\x08\x00'  # dwm_cfg_get
@@ -51,8 +53,8 @@ class TlvDialogue(Dialogue):
         self._forget(0.0)
 
     def _forget(self, now: float) -> None:
-        self._setup = deque([_Request.VERSION, _Request.INTERVALS, _Request.CONFIGURATION])
-        self._pending: _Request | None = None
+        self._setup = deque([Request.VERSION, Request.INTERVALS, Request.CONFIGURATION])
+        self._pending: Request | None = None
         self._sent_at = 0.0
         self._poll_at = now
         self._ready = 0  # when the module said that there is a location [ns]; 0: it did not
@@ -87,15 +89,15 @@ class TlvDialogue(Dialogue):
                 return b''
             self._missed()
         if self._unanswered and self._unanswered % (MOST_TRIES + 1) == MOST_TRIES:
-            return self._send(_Request.LEAVE_SHELL, now)
+            return self._send(Request.LEAVE_SHELL, now)
         if self._setup:
             return self._send(self._setup.popleft(), now)
         if self._ready:
-            return self._send(_Request.LOCATION, now)
+            return self._send(Request.LOCATION, now)
         if now < self._poll_at:
             return b''
         self._poll_at = max(self._poll_at + self._period_s, now)
-        return self._send(_Request.STATUS, now)
+        return self._send(Request.STATUS, now)
 
     def heard(self, data: bytes, parsed: Parsed, frames: int, now: float) -> Parsed:
         """Believe locations that were asked for, once, and date them."""
@@ -103,7 +105,7 @@ class TlvDialogue(Dialogue):
         records: list[Record] = []
         refusals = list(parsed.refusals)
         in_time = now <= self._sent_at + ANSWER_S
-        located = self._pending is _Request.LOCATION and in_time and self._ready > 0
+        located = self._pending is Request.LOCATION and in_time and self._ready > 0
         for record in parsed.records:
             if isinstance(record, DeviceFact):
                 records.append(record)
@@ -128,12 +130,12 @@ class TlvDialogue(Dialogue):
             return ''
         return f'the module does not answer: {self._unanswered} requests in vain ({self._what})'
 
-    def _send(self, request: _Request, now: float) -> bytes:
+    def _send(self, request: Request, now: float) -> bytes:
         self._pending, self._sent_at, self._frames = request, now, 0
         return request.value
 
     def _missed(self) -> None:
-        if self._pending is _Request.LOCATION:
+        if self._pending is Request.LOCATION:
             self._ready = 0
             if self._frames:  # a position without distances: no anchor was heard
                 self._pending = None
@@ -147,7 +149,7 @@ class TlvDialogue(Dialogue):
         self._unanswered = 0
         if incomplete:
             return
-        if self._pending is _Request.LOCATION:
+        if self._pending is Request.LOCATION:
             self._ready = 0
         self._pending = None
 

@@ -37,7 +37,7 @@ class EmulatedDwm1001:
         self.moving_s, self.still_s = moving_s, still_s
         self.moves = True
         self.in_network = True
-        self.asleep = False  # loses the first byte that it is sent
+        self.asleep = 0  # so often it loses what it is sent, waking up
         self.deaf = False
         self.commands = []
         self.requests = []
@@ -60,7 +60,8 @@ class EmulatedDwm1001:
         if self.deaf:
             return b''
         if self.asleep:
-            self.asleep, data = False, data[1:]
+            self.asleep -= 1
+            return b''
         if self.shell:
             return self._hear_shell(data)
         if data.startswith(b'\r') and not data.strip(b'\r'):

@@ -55,6 +55,17 @@ def test_stamp_is_at_most_a_question_late():
     assert len(ranges) >= 4 * 25
 
 
+def test_stamp_is_that_of_the_announcement():
+    """Not of the location, which comes an answer later: 0.1 s here."""
+    bench = tlv(latency_s=0.1)
+    bench.run(2.0)
+    count = 0
+    while count < 20:
+        for item in bench.session.step(0.1).ranges:
+            count += 1
+            assert bench.clock.now - (item.stamp - EPOCH_NS) / 1e9 >= 0.1 - 1e-6
+
+
 def test_late_answer_is_refused():
     """An answer after its time may be to anything: no range, and it is counted."""
     bench = tlv(latency_s=ANSWER_S + 0.05)
