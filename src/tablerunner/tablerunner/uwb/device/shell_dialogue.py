@@ -85,7 +85,7 @@ class ShellDialogue(Dialogue):
     @property
     def status(self) -> str:
         """What the dialogue is doing."""
-        if self._stage is _Stage.RUNNING and self._vain:
+        if self._stage is _Stage.RUNNING and self._vain > 1:
             return 'the shell answers, but the tag reports no ranges'
         return _WORDS[self._stage]
 

@@ -1,10 +1,14 @@
 """Captures on disk: played at their pace, moved to the present or not, and refused when bad."""
 
 import re
+import tempfile
+from pathlib import Path
 
 import pytest
 from bench_clock import EPOCH_NS, Clock
 from device_writers import datagram, node_frame3
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tablerunner.errors import ConfigError
 from tablerunner.uwb.device.build import build_session
@@ -171,3 +175,38 @@ def test_session_plays_a_capture_to_its_end(path):
     # 5.9 s of capture, 500 times faster.
     assert stamps[-1] - stamps[0] == pytest.approx(5_900_000_000 / 500, rel=0.02)
     assert stamps[0] > EPOCH_NS
+
+
+GOOD = capture_header('linktrack', TAKEN) + frames(6, period_ns=1_000_000)
+TRUE = {('anchor0', 3.21), ('anchor1', 12.345)}
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(st.tuples(st.integers(0, len(GOOD) - 1), st.integers(1, 255)), max_size=4),
+    st.integers(0, len(GOOD)),
+    st.binary(max_size=60),
+)
+def test_damaged_capture_is_refused_or_gives_true_ranges(changes, at, noise):
+    """Bytes changed, others put in, anywhere: one sentence, or what was captured, to the end."""
+    data = bytearray(GOOD)
+    for place, change in changes:
+        data[place] ^= change
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / 'drive.trc'
+        file.write_bytes(bytes(data[:at]) + noise + bytes(data[at:]))
+        config = DeviceConfig(device='replay', replay=ReplayConfig(file=str(file), rate=1000.0))
+        try:
+            session = build_session(config, [])
+        except ConfigError as error:
+            assert error.field == 'replay.file'  # noqa: PT017 (that it fails is one of two ways)
+            return
+        ranges, ended = [], False
+        for _ in range(300):
+            ranges += session.step(0.01).ranges
+            ended = session.health.link is LinkState.ENDED
+            if ended:
+                break
+        session.close()
+    assert ended
+    assert {(item.anchor_id, item.range_m) for item in ranges} <= TRUE
