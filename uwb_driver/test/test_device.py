@@ -36,6 +36,8 @@ ADDRESSES = {'north': 0x0A01, 'east': 0x0A02, 'south': 0x2E10}
 LINKTRACK = [(1, 4 + k, round(1000 * METRES[name]), -82.0, -80.0) for k, name in enumerate(METRES)]
 TRUE = set(METRES.items())
 STATUS = 'uwb_driver'
+START_S = 60.0
+"""A process may take long to start where others keep the machine busy."""
 
 
 def module() -> EmulatedDwm1001:
@@ -117,7 +119,7 @@ def test_dwm1001_process_is_begun_pulled_and_found_again(
     emulated = module()
     with Running(emulated, wire):
         process = start(processes, dwm1001(wire, mode))
-        probe.wait_for(lambda: found(ranges) == TRUE, 'ranges of all anchors')
+        probe.wait_for(lambda: found(ranges) == TRUE, 'ranges of all anchors', START_S)
         late_s = [
             time.time() - stamp_from_message(item.header.stamp) / 1e9 for item in ranges[-3:]
         ]
@@ -149,7 +151,9 @@ def test_linktrack_process_in_a_storm_gives_true_ranges_only(
     wire.unplug()
     ranges = probe.listen(UwbRange, 'uwb/ranges')
     process = start(processes, linktrack(wire))
-    probe.wait_diagnostic(STATUS, 'device last failure', lambda text: 'does not exist' in text)
+    probe.wait_diagnostic(
+        STATUS, 'device last failure', lambda text: 'does not exist' in text, START_S
+    )
     wire.plug()
     rng = random.Random(5)
     begun = time.monotonic()
@@ -169,7 +173,7 @@ def test_linktrack_process_in_a_storm_gives_true_ranges_only(
             due += 0.02
         return len(ranges) > 400 and now > 4.5
 
-    probe.wait_for(storm, '400 ranges')
+    probe.wait_for(storm, '400 ranges', START_S)
     assert found(ranges) == TRUE
     assert {item.tag_id for item in ranges} == {'tag7'}
     assert ranges[-1].rx_power == -80.0
@@ -197,7 +201,9 @@ def test_udp_process_takes_datagrams_of_one_tag(probe: Probe, processes: Process
         }
         process = start(processes, parameters)
         # The port is ours: said, and tried again until it is free.
-        probe.wait_diagnostic(STATUS, 'device last failure', lambda text: 'in use' in text)
+        probe.wait_diagnostic(
+            STATUS, 'device last failure', lambda text: 'in use' in text, START_S
+        )
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     entries = [{'anchor': name, 'range': metres} for name, metres in METRES.items()]
     number = 0
@@ -244,7 +250,7 @@ def test_replay_process_gives_what_was_captured(
         'replay': {'file': str(file), 'rate': 4.0, 'stamps': stamps},
     }
     process = start(processes, parameters)
-    probe.wait_diagnostic(STATUS, 'device state', 'ended')
+    probe.wait_diagnostic(STATUS, 'device state', 'ended', START_S)
     probe.wait_for(lambda: found(ranges) == TRUE, 'ranges')
     assert process.end() == 0
     span = stamp_from_message(ranges[-1].header.stamp) - stamp_from_message(ranges[0].header.stamp)
@@ -289,15 +295,15 @@ def test_still_tag_is_not_called_silent(probe: Probe, wire: Wire) -> None:
         emulated.moves = False
         probe.spin(0.3)
         ranges.clear()
-        levels: set[bytes] = set()
+        said: set[str] = set()
 
         def watch() -> bool:
             status = probe.diagnostic(f'{STATUS}: uwb/device')
-            levels.add(b'' if status is None else status.level)
+            said.add('' if status is None else status.message)
             return len(ranges) >= 3
 
         probe.wait_for(watch, 'the ranges of a still tag')
-    assert levels == {b'\x00'}
+    assert not [words for words in said if 'silent' in words]
 
 
 def test_what_comes_is_captured_and_can_be_played(
@@ -354,7 +360,7 @@ def test_corrupt_capture_exits_2_with_one_sentence(processes: Processes, tmp_pat
     file = tmp_path / 'bad.trc'
     file.write_bytes(b'\x00' * 1000)
     process = start(processes, {**ANCHORS, 'device': 'replay', 'replay': {'file': str(file)}})
-    assert process.wait() == 2
+    assert process.wait(START_S) == 2
     assert len(process.output.splitlines()) == 1
     assert process.output.startswith(f"parameters of /uwb_driver: replay.file: got '{file}'")
     assert 'no good header begins it' in process.output
