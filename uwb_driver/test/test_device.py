@@ -6,6 +6,7 @@ import contextlib
 import random
 import re
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -323,6 +324,7 @@ def test_what_comes_is_captured_and_can_be_played(
 
     probe.wait_for(send, 'ranges')
     node.destroy_node()
+    assert 'uwb device' not in {thread.name for thread in threading.enumerate()}
     count = len(ranges)
     ranges.clear()
     parameters = {**linktrack(wire), 'device': 'replay', 'replay': {'file': str(file)}}
