@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import random
 import re
 import socket
@@ -124,7 +125,7 @@ def test_dwm1001_process_is_begun_pulled_and_found_again(
         late_s = [
             time.time() - stamp_from_message(item.header.stamp) / 1e9 for item in ranges[-3:]
         ]
-        assert all(-0.001 < each < 1.0 for each in late_s)
+        assert all(-0.001 < each < 5.0 for each in late_s)
         assert ranges[0].header.frame_id == 'uwb_tag'
         stamps = {stamp_from_message(item.header.stamp) for item in ranges}
         assert len(stamps) <= len(ranges) // 3 + 1
@@ -233,14 +234,14 @@ def test_udp_process_takes_datagrams_of_one_tag(probe: Probe, processes: Process
 def test_replay_process_gives_what_was_captured(
     probe: Probe, processes: Processes, tmp_path: Path, stamps: str
 ) -> None:
-    """Ranges at their pace, with times of now or of then; the end is told."""
+    """Ranges with times of now, at the pace that is asked for, or of then."""
     taken = time.time_ns() - 3600 * 10**9
     file = tmp_path / 'drive.trc'
     file.write_bytes(
         capture_header('linktrack', taken)
         + b''.join(
             capture_chunk(taken + k * 20_000_000, node_frame3(LINKTRACK, system_time=20 * k))
-            for k in range(200)
+            for k in range(1500)
         )
     )
     ranges = probe.listen(UwbRange, 'uwb/ranges')
@@ -248,21 +249,19 @@ def test_replay_process_gives_what_was_captured(
         **ANCHORS,
         'device': 'replay',
         'device_ids': ['4', '5', '6'],
-        'replay': {'file': str(file), 'rate': 4.0, 'stamps': stamps},
+        'replay': {'file': str(file), 'rate': 2.0, 'stamps': stamps},
     }
     process = start(processes, parameters)
-    probe.wait_diagnostic(STATUS, 'device state', 'ended', START_S)
-    probe.wait_for(lambda: found(ranges) == TRUE, 'ranges')
+    probe.wait_for(lambda: len(ranges) >= 60, 'ranges', START_S)
     assert process.end() == 0
-    span = stamp_from_message(ranges[-1].header.stamp) - stamp_from_message(ranges[0].header.stamp)
-    age_s = time.time() - stamp_from_message(ranges[-1].header.stamp) / 1e9
-    if stamps == 'now':
-        assert span < 3_980_000_000 / 4 + 10_000_000
-        assert 0.0 <= age_s < 20.0
-    else:
-        assert span < 3_980_000_000 + 10_000_000
-        assert span > 1_500_000_000  # what came after the nodes knew each other
-        assert age_s > 3500.0
+    assert found(ranges) == TRUE
+    times = sorted({stamp_from_message(item.header.stamp) for item in ranges})
+    steps = sorted(b - a for a, b in itertools.pairwise(times))
+    age_s = time.time() - times[-1] / 1e9
+    # 20 ms in the capture, twice as fast.
+    period, oldest, youngest = (10_000_000, 60, 0) if stamps == 'now' else (20_000_000, 4e3, 3e3)
+    assert steps[len(steps) // 2] == pytest.approx(period, abs=1_000_000)
+    assert youngest <= age_s < oldest
 
 
 def test_wrong_baud_rate_is_told_of_on_diagnostics(probe: Probe, wire: Wire) -> None:
@@ -310,7 +309,7 @@ def test_still_tag_is_not_called_silent(probe: Probe, wire: Wire) -> None:
 def test_what_comes_is_captured_and_can_be_played(
     probe: Probe, wire: Wire, tmp_path: Path
 ) -> None:
-    """The file of one run is the device of the next, with the same ranges."""
+    """The file of one run is the device of the next, with the same ranges; the end is told."""
     file = tmp_path / 'kept.trc'
     ranges = probe.listen(UwbRange, 'uwb/ranges')
     node = probe.host(UwbDriver, parameter_overrides=flat(linktrack(wire, capture_file=str(file))))
@@ -330,6 +329,7 @@ def test_what_comes_is_captured_and_can_be_played(
     parameters = {**linktrack(wire), 'device': 'replay', 'replay': {'file': str(file)}}
     probe.host(UwbDriver, parameter_overrides=flat(parameters))
     probe.wait_for(lambda: len(ranges) >= count, 'the same ranges again')
+    probe.wait_diagnostic(STATUS, 'device state', 'ended')
     assert found(ranges) == TRUE
 
 
