@@ -35,9 +35,10 @@ MOST_SHARE = 0.1
 """Of one core, for a line that is never silent."""
 
 
-def node_frame(mark: int, count: int) -> bytes:
+def node_frame(mark: int, count: int, time_ms: int = 0) -> bytes:
     """Return a LinkTrack frame of some nodes."""
-    head = bytes(115) if mark == 4 else bytes(17)
+    system_time = time_ms.to_bytes(4, 'little')
+    head = bytes(2) + system_time + bytes(109) if mark == 4 else bytes(6) + system_time + bytes(7)
     nodes = b''.join(
         bytes([1, k])
         + (3000 + 700 * k).to_bytes(3, 'little')

@@ -11,6 +11,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import camera
+import device
 import drive_rooms
 import filter_step
 import fuzzy
@@ -34,6 +35,7 @@ BENCHES: dict[str, Callable[[], Iterable[Result]]] = {
     'offline': offline.measure,
     'latency': latency.measure,
     'safety': safety.measure,
+    'device': device.measure,
     'processor': processor.measure,
     'memory': memory.measure,
     'fuzzy': fuzzy.measure,

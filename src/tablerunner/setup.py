@@ -26,6 +26,7 @@ setup(
         'rich',
         'filterpy',
         'opencv-python-headless',
+        'pyserial',
         'rosbags',
         'typer',
     ],

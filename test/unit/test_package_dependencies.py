@@ -25,6 +25,7 @@ KEYS = {
     'psutil': 'python3-psutil',
     'filterpy': 'python3-filterpy-pip',
     'cv2': 'python3-opencv',
+    'serial': 'python3-serial',
     'hypothesis': 'python3-hypothesis',
     'pytest': 'python3-pytest',
 }

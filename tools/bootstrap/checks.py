@@ -31,6 +31,7 @@ ROS_MACHINE_MODULES = {
     'psutil': 'python3-psutil',
     'typer': 'python3-typer',
     'filterpy': 'filterpy (pip)',
+    'serial': 'python3-serial',
     'rosbags': 'rosbags (pip)',
 }
 

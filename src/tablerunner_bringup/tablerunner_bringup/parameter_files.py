@@ -26,6 +26,7 @@ from tablerunner.config import Config, Parameter, parameters_of
 from tablerunner.estimation import LocalizerConfig, SmootherConfig
 from tablerunner.odometry import OdometerConfig
 from tablerunner.uwb import AnchorHealthConfig, PositionerConfig, RangerConfig
+from tablerunner.uwb.device import DeviceConfig
 from tablerunner.vision import LocatorConfig
 from tablerunner_ros.stamps import StampConfig
 from uwb_driver.params import UwbDriverConfig
@@ -34,6 +35,7 @@ CONFIGS: dict[str, tuple[type[Config], ...]] = {
     'uwb_driver': (
         UwbDriverConfig,
         StampConfig,
+        DeviceConfig,
         RangerConfig,
         PositionerConfig,
         AnchorHealthConfig,

@@ -115,6 +115,10 @@ class Diagnostics:
         """Report a stream from now on; silence beyond `silence_s` is an error (0: never)."""
         self._streams[source] = _Stream(silence_s)
 
+    def allow_silence(self, source: str, silence_s: float) -> None:
+        """Let a stream that is watched be silent for another time from now on."""
+        self._stream(source).silence_ns = round(silence_s * NANOSECONDS)
+
     def describe(self, extra: Callable[[Report], None]) -> None:
         """Call back before each report to raise the level or add values of the node's status."""
         self._extras.append(extra)

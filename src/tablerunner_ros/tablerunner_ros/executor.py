@@ -3,10 +3,10 @@
 rclpy's SingleThreadedExecutor builds a wait set of every entity anew for each message, wraps each
 callback in coroutines and a task, and wakes itself twice more per callback, each time building
 the wait set again. `LeanExecutor` keeps one wait set until the entities change and calls
-subscriptions and timers directly. Messages that wait together are handled in the order in which
-they arrived, whatever their topics: a node that was not scheduled for a while would otherwise take
-one message of each topic in turn, and an IMU at twice the rate of the wheels would fall ever
-further behind them. Everything rarer (services, clients, actions, coroutines and
+subscriptions, timers and guard conditions directly. Messages that wait together are handled in
+the order in which they arrived, whatever their topics: a node that was not scheduled for a while
+would otherwise take one message of each topic in turn, and an IMU at twice the rate of the wheels
+would fall ever further behind them. Everything rarer (services, clients, actions, coroutines and
 tasks) it leaves to the code of rclpy that it inherits. The events of publishers and subscriptions
 (a peer asks for another QoS), one or two for each of them, do not wake it: it looks at them once
 a second. Measurements: docs/nodes.md.
@@ -116,9 +116,13 @@ class LeanExecutor(SingleThreadedExecutor):
                 subscription.callback(*taken)
         for pointer in wait_set.get_ready_entities('guard_condition'):
             guard = self._guards.get(pointer)
-            if guard is not None:  # None: the executor's own, which has done its work by waking
+            if guard is None:  # the executor's own, which has done its work by waking
+                continue
+            if inspect.iscoroutinefunction(guard.callback):
                 guard._executor_triggered = True  # noqa: SLF001
                 rare = True
+            else:
+                guard.callback()
         if (
             rare
             or wait_set.get_ready_entities('service')

@@ -128,6 +128,16 @@ def test_diagnostics_watched_stream_warns_before_it_begins_and_errs_when_silent(
     assert (status.level, status.message) == (ERROR, 'silent for 0.8 s')
 
 
+def test_diagnostics_stream_may_be_allowed_another_silence(desk: Desk) -> None:
+    """A tag that stands still is silent for longer; its counters go on."""
+    desk.reporter.watch('uwb/device', 0.5)
+    desk.reporter.take('uwb/device', 1)
+    desk.reporter.allow_silence('uwb/device', 2.0)
+    assert desk.report(1.9)['mine: uwb/device'].level == OK
+    status = desk.report(0.2)['mine: uwb/device']
+    assert (status.level, values(status)['taken']) == (ERROR, '1')
+
+
 def test_diagnostics_refusals_of_a_silent_stream_are_both_told(desk: Desk) -> None:
     """Two things at one level are both in the words."""
     desk.reporter.watch('odom', 0.5)

@@ -282,6 +282,20 @@ def test_executor_guard_condition_calls_back(bench: Bench) -> None:
     assert called == [1]
 
 
+def test_executor_guard_condition_may_be_a_coroutine(bench: Bench) -> None:
+    """That is left to rclpy."""
+    called: list[int] = []
+
+    async def call() -> None:
+        called.append(1)
+
+    guard = bench.node.create_guard_condition(call)
+    bench.executor.spin_once(0.0)
+    guard.trigger()
+    bench.until(lambda: called)
+    assert called == [1]
+
+
 def test_executor_timer_that_is_cancelled_stops(bench: Bench) -> None:
     """A cancelled timer does not fire, nor does it keep the executor busy."""
     fired: list[int] = []

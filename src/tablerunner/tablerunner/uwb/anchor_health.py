@@ -100,10 +100,15 @@ class AnchorWatch:
     config : AnchorHealthConfig
     anchor_ids : sequence of str
         Anchors that the tag goes round.
+    at_once : bool
+        Whether the device counts rounds of all anchors, and not exchanges.
     """
 
-    def __init__(self, config: AnchorHealthConfig, anchor_ids: Sequence[str]) -> None:
+    def __init__(
+        self, config: AnchorHealthConfig, anchor_ids: Sequence[str], at_once: bool = False
+    ) -> None:
         self.config = config
+        self._numbers_in_round = 1 if at_once else max(len(anchor_ids), 1)
         self._ranges: dict[str, deque[tuple[int, int, LosState]]] = {
             name: deque() for name in anchor_ids
         }
@@ -157,7 +162,7 @@ class AnchorWatch:
         numbers = [entry[1] for queue in self._ranges.values() for entry in queue]
         if not numbers:
             return math.nan
-        expected = (max(numbers) - min(numbers) + 1) / len(self._ranges)
+        expected = (max(numbers) - min(numbers) + 1) / self._numbers_in_round
         # A device that does not count sends one number; a counter that wrapped says nothing.
         if expected < _FEWEST or expected > 10 * len(numbers):
             return math.nan

@@ -1,4 +1,4 @@
-"""From exchanges to calibrated ranges, one at a time, refusing what cannot be right."""
+"""From exchanges, or a device's ranges, to calibrated ranges; refuses what cannot be right."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tablerunner.uwb.nlos.range_judge import NLOS_TESTS, RangeJudge
 from tablerunner.uwb.nlos.range_variance import variance_threshold
 
 SOURCE = 'uwb/exchanges'
+DEVICE_SOURCE = 'uwb/device'
 
 _LONGEST_EXCHANGE_TICKS = 0.1 / ranging.TICK_S
 
@@ -130,7 +131,7 @@ class RangerConfig(Config):
 
 
 class Ranger:
-    """Turns exchanges into ranges; remembers only what came last of each anchor."""
+    """Turns exchanges or raw ranges into ranges; remembers what came last of each anchor."""
 
     def __init__(self, config: RangerConfig) -> None:
         self._sequence: dict[tuple[str, str], int] = {}
@@ -165,8 +166,7 @@ class Ranger:
         Refused are a zero stamp, an unknown anchor, a repeated sequence number, a stamp that does
         not advance, times that no exchange can have, and a range that is negative or too long.
         """
-        calibration = self._calibration.get(sample.anchor_id)
-        if calibration is None:
+        if sample.anchor_id not in self._calibration:
             return self._refuse(sample, 'unknown anchor')
         link = (sample.anchor_id, sample.tag_id)
         if sample.stamp > 0 and self._sequence.get(link) == sample.sequence:
@@ -185,13 +185,37 @@ class Ranger:
         )
         if min(times) <= 0 or sum(times) > _LONGEST_EXCHANGE_TICKS:
             return self._refuse(sample, 'impossible exchange times')
-        raw = ranging.distance(ranging.double_sided(*times))
-        bias, scale = calibration
+        return self._finish(sample, ranging.distance(ranging.double_sided(*times)), SOURCE)
+
+    def take(self, sample: RangeSample) -> RangeSample | Refusal:
+        """Return the calibrated range of one that a device has measured, or why there is none.
+
+        Refused are the same as of exchanges, but for their times and the sequence number, which
+        is the device's own matter.
+
+        Parameters
+        ----------
+        sample : RangeSample
+            With the range as the device gave it.
+        """
+        if sample.anchor_id not in self._calibration:
+            return self._refuse(sample, 'unknown anchor', DEVICE_SOURCE)
+        link = (sample.anchor_id, sample.tag_id)
+        order = self._order.setdefault(link, StampOrder()).judge(sample.stamp)
+        if order in (Order.ZERO, Order.LATE):
+            return self._refuse(sample, order.value, DEVICE_SOURCE)
+        return self._finish(sample, sample.range_m, DEVICE_SOURCE)
+
+    def _finish(
+        self, sample: ExchangeSample | RangeSample, raw: float, source: str
+    ) -> RangeSample | Refusal:
+        """Calibrate a raw range and judge whether its line was free."""
+        bias, scale = self._calibration[sample.anchor_id]
         range_m = ranging.calibrated(raw, bias, scale)
         if not range_m > 0.0:
-            return self._refuse(sample, 'negative range')
+            return self._refuse(sample, 'negative range', source)
         if range_m > self.config.max_range:
-            return self._refuse(sample, 'range beyond max_range')
+            return self._refuse(sample, 'range beyond max_range', source)
         probability = self._judge.probability(
             sample.anchor_id, range_m, sample.rx_power_dbm, sample.first_path_power_dbm
         )
@@ -215,8 +239,10 @@ class Ranger:
         )
 
     @staticmethod
-    def _refuse(sample: ExchangeSample, reason: str) -> Refusal:
-        return Refusal(sample.stamp, SOURCE, sample.anchor_id, reason)
+    def _refuse(
+        sample: ExchangeSample | RangeSample, reason: str, source: str = SOURCE
+    ) -> Refusal:
+        return Refusal(sample.stamp, source, sample.anchor_id, reason)
 
 
 def _los_state(probability: float) -> LosState:

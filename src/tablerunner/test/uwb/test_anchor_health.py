@@ -107,3 +107,12 @@ def test_faults_are_told_by_the_limits():
         'its ranges -0.20 m off the fix',
     )
     assert watch.health('B').faults(watch.config) == ('50% of its exchanges lost',)
+
+
+def test_device_that_counts_rounds_loses_what_is_missing_in_them():
+    """One number for both anchors: all of A's ranges are there, every second of B's is not."""
+    watch = AnchorWatch(AnchorHealthConfig(), NAMES, at_once=True)
+    for index in range(100):
+        for name in NAMES if index % 2 else NAMES[:1]:
+            watch.add_range(RangeSample(START + index * 10**8, name, 'tag', index, 5.0))
+    assert (watch.health('A').loss, watch.health('B').loss) == pytest.approx((0.0, 0.5), abs=0.02)

@@ -139,3 +139,40 @@ def test_nlos_offset_is_taken_off_blocked_ranges_only():
 def test_unknown_nlos_test_is_refused_with_the_names():
     with pytest.raises(ConfigError, match=r'nlos_test.*signal_quality'):
         CONFIG.replace(nlos_test='guess')
+
+
+def measured(stamp=SECOND, anchor='A0', distance=5.0, gap=3.0):
+    return RangeSample(
+        stamp, anchor, 'tag', 1, distance, rx_power_dbm=-80.0, first_path_power_dbm=-80.0 - gap
+    )
+
+
+def test_take_calibrates_and_judges_a_devices_range():
+    """As of an exchange; what the device gave is kept beside."""
+    ranger = Ranger(CONFIG.replace(anchor_biases=(0.3, 0.0), anchor_scales=(0.02, 0.0)))
+    result = ranger.take(measured(distance=5.4))
+    assert isinstance(result, RangeSample)
+    assert (result.raw_range_m, result.range_m) == (5.4, pytest.approx((5.4 - 0.3) / 1.02))
+    assert result.variance_m2 == pytest.approx(CONFIG.range_std**2)
+    assert result.los is LosState.LOS
+    assert ranger.take(measured(2 * SECOND, gap=15.0)).los is LosState.NLOS
+
+
+@pytest.mark.parametrize(
+    ('bad', 'words'),
+    [
+        (measured(0), 'zero stamp'),
+        (measured(SECOND), 'stamp does not advance'),
+        (measured(2 * SECOND, 'A9'), 'unknown anchor'),
+        (measured(2 * SECOND, distance=-0.5), 'negative range'),
+        (measured(2 * SECOND, distance=80.0), 'range beyond max_range'),
+        (measured(2 * SECOND, distance=math.nan), 'negative range'),
+    ],
+)
+def test_take_refuses_what_cannot_be_and_goes_on(bad, words):
+    ranger = Ranger(CONFIG)
+    assert isinstance(ranger.take(measured()), RangeSample)
+    refusal = ranger.take(bad)
+    assert isinstance(refusal, Refusal)
+    assert (refusal.source, refusal.reason) == ('uwb/device', words)
+    assert isinstance(ranger.take(measured(3 * SECOND)), RangeSample)

@@ -11,7 +11,7 @@ import re
 
 from tablerunner.uwb.protocol.parser import MAX_RANGE_M, Parser
 from tablerunner.uwb.protocol.plausible import ODD_RANGE, odd_one
-from tablerunner.uwb.protocol.record import DevicePosition, DeviceRange, Place
+from tablerunner.uwb.protocol.record import DeviceFact, DevicePosition, DeviceRange, Place
 
 LONGEST_LINE = 1024
 """A line of fifteen anchors has 600 characters at most."""
@@ -36,12 +36,16 @@ _WORD = re.compile(rb'([0-9A-F]{4})\[' + _THREE + rb'\]=' + _RANGE + rb'(?: |\Z)
 _REST = re.compile(rb'(?:le_us=\d+(?: est\[' + _THREE + rb',(\d{1,3})\])?)?\Z')
 _POSITION = re.compile(rb'POS,' + _THREE + rb',(\d{1,3})\Z')
 _MEASURED = re.compile(rb'DIST|POS|,AN\d|\]=|est\[|le_us')
+_INFO = re.compile(rb'\[\d+\.\d+ INF\] (sys|mode|cfg): (.*)\Z')
+_FIRMWARE = re.compile(rb'fw_ver=x([0-9A-Fa-f]{8})\b')
+_INTERVALS = re.compile(rb'stat_det=([01]) .*upd_rate_norm=(\d{1,5}) upd_rate_stat=(\d{1,5}) ')
 _TEXT = re.compile(rb'[\x20-\x7e\t]*\Z')
 _PROMPT = b'dwm> '
+_ERROR = b'\x40\x01\x01'  # what it answers to text while it is not in its shell
 
 
 class Dwm1001Shell(Parser):
-    """Reads the lines of `lec`, `les` and `lep`; other text of the shell is passed over.
+    """Reads the lines of `lec`, `les`, `lep`, `si`; other text of the shell is passed over.
 
     A line of `les` does not tell how many anchors it has: what is lost between two of them gives
     one anchor the range of another. A line without a position may have lost it, from within the
@@ -81,8 +85,12 @@ class Dwm1001Shell(Parser):
         self._sets.clear()
 
     def _take(self, data: bytes) -> None:
-        *lines, rest = (self._buffer + data).split(b'\n')
+        buffer = self._buffer + data
+        *lines, rest = buffer.split(b'\n')
+        behind = len(buffer)
         for line in lines:
+            behind -= len(line) + 1
+            self._date(behind)
             if self._skipping:
                 self._skipping = False
             elif len(line) > LONGEST_LINE:
@@ -96,12 +104,15 @@ class Dwm1001Shell(Parser):
         self._buffer = b'' if self._skipping else rest
 
     def _line(self, line: bytes) -> None:
-        while line.startswith(_PROMPT):
-            line = line[len(_PROMPT) :]
+        while line.startswith((_PROMPT, _ERROR)):
+            line = line[len(_PROMPT if line.startswith(_PROMPT) else _ERROR) :]
         if not _TEXT.match(line):
             self._refuse('line is no text')
             return
         if not _MEASURED.search(line):
+            info = _INFO.match(line)
+            if info is not None:
+                self._info(info[1], info[2])
             return
         if line.startswith(b'DIST,'):
             self._lec(line)
@@ -109,6 +120,21 @@ class Dwm1001Shell(Parser):
             self._lep(line)
         else:
             self._les(line)
+
+    def _info(self, kind: bytes, text: bytes) -> None:
+        """Read what `si` says of the module: firmware, mode, update intervals of 0.1 s."""
+        firmware, intervals = _FIRMWARE.search(text), _INTERVALS.search(text)
+        if kind == b'sys' and firmware is not None:
+            self._fact('firmware', firmware[1].decode())
+        elif kind == b'mode':
+            self._fact('mode', text.decode()[:60])
+        elif kind == b'cfg' and intervals is not None:
+            detects, moving, still = (int(number) for number in intervals.groups())
+            self._fact('update_interval_ms', 100 * moving)
+            self._fact('update_interval_still_ms', 100 * (still if detects else moving))
+
+    def _fact(self, name: str, value: str | int) -> None:
+        self._give(DeviceFact(self._stamp, name, value))
 
     def _lec(self, line: bytes) -> None:
         head = _HEAD.match(line)

@@ -74,6 +74,7 @@ class FramedParser(Parser):
                 faults.append((waiting, Fault(TRUNCATED)))
             self._account(start - begin, faults)
             self._frames += 1
+            self._date(len(buffer) - start - length)
             self._decode(buffer, start, length)
             begin = at = start + length
             waiting = -1

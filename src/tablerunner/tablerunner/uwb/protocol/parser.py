@@ -34,6 +34,10 @@ class Parser(ABC):
         One tick of the device's time [ns]; 0 where the protocol carries none.
     counter_bits : int
         Width of the device's counter.
+    byte_ns : float
+        What the line takes for a byte [ns], where it is known. A frame with others behind it in
+        one read has waited for so many of their bytes at least, and is dated back by that; no
+        two frames have one stamp then.
     """
 
     source = ''
@@ -46,7 +50,8 @@ class Parser(ABC):
         self._refusals: list[Refusal] = []
         self._counts: Counter[str] = Counter()
         self._frames = 0
-        self._stamp = 0
+        self.byte_ns = 0.0
+        self._stamp = self._arrival = self._last = 0
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -65,7 +70,7 @@ class Parser(ABC):
 
     def feed(self, data: bytes, stamp: int) -> Parsed:
         """Take what arrived at `stamp` [ns], and return what became whole by it."""
-        self._stamp = stamp
+        self._stamp = self._arrival = stamp
         self._take(data)
         parsed = Parsed(tuple(self._records), tuple(self._refusals))
         self._records.clear()
@@ -79,6 +84,11 @@ class Parser(ABC):
     @abstractmethod
     def _take(self, data: bytes) -> None:
         """Do the protocol's own work, through `_give` and `_refuse`."""
+
+    def _date(self, behind: int) -> None:
+        """Date the frame that is decoded next, behind whose end so many bytes came already."""
+        stamp = self._arrival - round(behind * self.byte_ns)
+        self._stamp = self._last = min(max(stamp, self._last + 1), self._arrival)
 
     def _give(self, record: Record) -> None:
         """Hand out a record; a range that cannot be is refused instead."""

@@ -5,7 +5,11 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
+from tablerunner.uwb.device import DEVICES, DeviceConfig
+from tablerunner.uwb.device.anchor_names import anchor_names
+from tablerunner.uwb.device.tlv_dialogue import ANSWER_S, LATE, Request
 from tablerunner.uwb.protocol import PROTOCOLS, Dwm1001Shell, Dwm1001Tlv, LinkTrack, Udp
 from tablerunner.uwb.protocol.dwm1001_tlv import ERRORS
 from tablerunner.uwb.protocol.linktrack import ROLES
@@ -38,12 +42,14 @@ def test_tlv_example():
 
 
 def test_shell_examples():
-    lec, les, lep = (
+    lec, les, lep, *info = (
         line.strip().encode() + b'\r\n'
         for line in section('DWM1001: shell')
         if line.startswith('    ')
     )
     parser = Dwm1001Shell()
+    facts = parser.feed(b''.join(info), 1).records
+    assert [item.value for item in facts] == ['01030001', 'tn (act,twr,np,le)', 100, 10_000]
     assert [item.range_m for item in parser.feed(lec, 1).ranges] == [3.44, 5.68]
     assert parser.feed(les, 1).refusals[0].reason in PAGE
     assert [item.range_m for item in parser.feed(les, 1).ranges] == [3.38, 5.49]
@@ -75,3 +81,24 @@ def test_roles_and_errors_are_told():
     assert all(f'{code} ' in PAGE for code in ERRORS)
     assert f'LinkTrack {LinkTrack.longest} bytes' in PAGE
     assert f'TLV {Dwm1001Tlv.longest},' in PAGE
+
+
+def test_devices_defaults_and_requests_are_told():
+    """What the page says of the driver is what the code does."""
+    config = DeviceConfig()
+    text = ' '.join(PAGE.split())
+    for name in DEVICES:
+        assert any(line.startswith(f'| `{name}` |') for line in PAGE.splitlines())
+    reconnect = config.reconnect
+    assert (reconnect.first, reconnect.longest, reconnect.patience) == (0.5, 8.0, 10.0)
+    assert 'after 0.5 s, 1 s, 2 s ... 8 s (`reconnect.first`, `reconnect.longest`)' in text
+    assert '`reconnect.patience` (10 s)' in text
+    assert f'`dwm1001.poll_rate`, {config.dwm1001.poll_rate:g} Hz' in text
+    assert f'later than {ANSWER_S:g} s is refused (`{LATE}`)' in text
+    for request in list(Request)[:5]:
+        assert f'(`{request.value.hex(" ")}`)' in text
+    example = PAGE.split('# robot.yaml\n')[1].split('\n\n')[0]
+    given = yaml.safe_load(example)['/**/uwb_driver']['ros__parameters']
+    names = anchor_names('dwm1001', given['device_ids'], given['anchor_ids'])
+    assert names['022E'] == 'north'
+    assert len(given['anchor_positions']) == 3 * len(names) == 12

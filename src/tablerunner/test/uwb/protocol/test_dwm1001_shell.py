@@ -204,3 +204,48 @@ def test_line_with_one_fault_is_refused_by_its_part(change, expected):
     parsed = Dwm1001Shell().feed(lec_line(ANCHORS, PLACE).replace(*change), 1)
     assert [(item.reason, item.key) for item in parsed.refusals][:1] == [expected]
     assert not parsed.records
+
+
+def test_system_info_is_read_as_facts():
+    """Lines of `si` as public logs show them; text of the shell that is no damage."""
+    text = b'dwm> si\r\n[000042.580 INF] sys: fw2 fw_ver=x01030001 cfg_ver=x00010700\r\n'
+    text += b'[000042.590 INF] mode: tn (act,twr,np,le)\r\n'
+    text += b'[000042.590 INF] uwbmac: connected\r\n'
+    text += b'[000042.600 INF] cfg: sync=0 fwup=0 ble=1 leds=1 le=1 lp=0 stat_det=1 (sens=1) '
+    text += b'mode=0 upd_rate_norm=1 upd_rate_stat=100 label=DW01D2\r\n'
+    parsed = Dwm1001Shell().feed(text, 1)
+    assert [(item.name, item.value) for item in parsed.records] == [
+        ('firmware', '01030001'),
+        ('mode', 'tn (act,twr,np,le)'),
+        ('update_interval_ms', 100),
+        ('update_interval_still_ms', 10_000),
+    ]
+    assert not parsed.refusals
+
+
+def test_still_interval_without_stationary_detection_is_the_moving_one():
+    line = b'[000042.600 INF] cfg: stat_det=0 mode=0 upd_rate_norm=2 upd_rate_stat=100 label=D\r\n'
+    parsed = Dwm1001Shell().feed(line, 1)
+    assert [item.value for item in parsed.records] == [200, 200]
+
+
+def test_error_answers_before_the_shell_opened_are_passed_over():
+    """What the module says to text while it is not in its shell hides no line behind it."""
+    parsed = Dwm1001Shell().feed(b'\x40\x01\x01' * 3 + lec_line(ANCHORS, PLACE), 1)
+    assert ranges(parsed.records) == expected(ANCHORS)
+    assert not parsed.refusals
+
+
+def test_lines_that_came_in_one_read_are_dated_by_the_speed_of_the_wire():
+    """At 115200 baud a byte takes 87 us: the first of three lines came two lines earlier."""
+    line = lec_line(ANCHORS, PLACE)
+    parser = Dwm1001Shell()
+    parser.byte_ns = 1e10 / 115_200
+    parsed = parser.feed(line * 3, 10**9)
+    stamps = sorted({item.stamp for item in parsed.ranges})
+    taken = round(len(line) * 1e10 / 115_200)
+    assert stamps == pytest.approx([10**9 - 2 * taken, 10**9 - taken, 10**9], abs=2)
+    parsed = parser.feed(line * 3, 10**9 + 1000)  # faster than the wire can be: still in order
+    later = sorted({item.stamp for item in parsed.ranges})
+    assert len(later) == 3
+    assert stamps[-1] < later[0] < later[-1] == 10**9 + 1000

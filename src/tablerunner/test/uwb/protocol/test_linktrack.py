@@ -177,3 +177,14 @@ def test_frame_whose_sum_is_right_and_sense_is_not_is_refused(nodes, role, expec
     parsed = LinkTrack().feed(node_frame3(nodes, role=role), 1)
     assert [(item.reason, item.key) for item in parsed.refusals] == [expected]
     assert not parsed.records
+
+
+def test_frames_that_came_in_one_read_are_dated_by_the_speed_of_the_wire():
+    """The second of two whole frames has no bytes behind it; without a speed both came now."""
+    frame = node_frame3(NODES)
+    parser = LinkTrack()
+    parser.byte_ns = 1e10 / 921_600
+    stamps = [item.stamp for item in parser.feed(frame * 2, 10**9).ranges]
+    taken = round(len(frame) * 1e10 / 921_600)
+    assert stamps == pytest.approx([10**9 - taken] * 3 + [10**9] * 3, abs=2)
+    assert {item.stamp for item in LinkTrack().feed(frame * 2, 10**9).ranges} == {10**9}
