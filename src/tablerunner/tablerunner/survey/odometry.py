@@ -1,0 +1,67 @@
+"""What dead reckoning may read wrong all the time: scale of way and turns, drift of the heading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tablerunner.odometry import MotionNoise
+from tablerunner.survey.track import Pieces, rotated
+
+Array = NDArray[np.float64]
+
+WAY_STD, TURN_STD, DRIFT_STD = 0.03, 0.03, 0.01
+"""How wrong odometry is believed to be: share of the way, share of the turns, [rad/s]."""
+
+
+def noise_of(noise: MotionNoise) -> tuple[float, float, float, float]:
+    """Return the noise as `Pieces.whiteners` takes it."""
+    return (
+        noise.distance,
+        noise.heading_per_turn,
+        noise.heading_per_distance,
+        noise.heading_per_time,
+    )
+
+
+@dataclass(frozen=True)
+class OdometryMotions:
+    """Motions between knots as odometry tells them; values: way, turns, drift."""
+
+    pieces: Pieces
+    noise: MotionNoise
+
+    @property
+    def count(self) -> int:
+        """Number of values that stand for what is read wrong."""
+        return 3
+
+    @property
+    def priors(self) -> Array:
+        """Standard deviations of those values, shape (3,)."""
+        return np.array([WAY_STD, TURN_STD, DRIFT_STD])
+
+    def told(self, wrongs: Array) -> tuple[Array, Array]:
+        """Return the motions, and their derivatives by way, turns and drift."""
+        way, turns, drift = wrongs
+        motions, time = self.pieces.motions, self.pieces.time
+        more = turns * motions[:, 2] + drift * time
+        turned = rotated(motions[:, :2], 0.5 * more)
+        told = np.column_stack([(1.0 + way) * turned, motions[:, 2] + more])
+        by = np.zeros((len(motions), 3, 3))
+        by[:, :2, 0] = turned
+        by_turn = 0.5 * (1.0 + way) * np.column_stack([-turned[:, 1], turned[:, 0]])
+        for column, rate in ((1, motions[:, 2]), (2, time)):
+            by[:, :2, column] = rate[:, None] * by_turn
+            by[:, 2, column] = rate
+        return told, by
+
+    def whiteners(self) -> tuple[Array, Array]:
+        """Return `Pieces.whiteners` of the motions."""
+        return self.pieces.whiteners(noise_of(self.noise))
+
+    def turns(self, wrongs: Array) -> tuple[Array, Array, Array] | None:
+        """Return nothing: what the gyroscope said is in the odometry already."""
+        del wrongs
