@@ -97,7 +97,7 @@ class SurveyConfig:
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     usual_height_m: float = 1.0
     height_std_m: float = 1.0
-    bias_std_m: float = 0.15
+    bias_std_m: float = 0.1
     scale_std: float = 0.005
     noise: MotionNoise = field(default_factory=MotionNoise)
 

@@ -100,7 +100,6 @@ class _Stage:
     pieces: Pieces
     rows: Indices  # of the track, of each knot
     ranges: TagRanges
-    tags: Array  # lever of each range over the floor, (m, 2)
 
 
 class _Work:
@@ -197,7 +196,9 @@ class _Work:
         """Take the first `end` poses of the track, keeping what is known of the earlier ones."""
         track = self._data.track.cut(end)
         knots = choose_knots(track)
-        new = _stage(track, knots, self._table.within(track), self._data.tag_position)
+        table = self._table.within(track)
+        ranges = seen_from_knots(track, knots, table, self._data.tag_position)
+        new = _Stage(Pieces.of(track, knots), knots, ranges)
         if self._stage is None:
             origin = np.broadcast_to(track.poses[:1], (len(knots), 3))
             seen = relative(track.poses[knots], origin)
@@ -212,7 +213,7 @@ class _Work:
         """Place anchors that are not placed yet, or are placed where their ranges do not fit."""
         stage = self._known_stage()
         knots = self._poses[stage.ranges.knot]
-        tags = knots[:, :2] + rotated(stage.tags, knots[:, 2])
+        tags = knots[:, :2] + rotated(stage.ranges.lever[:, :2], knots[:, 2])
         for index in range(len(self._ids)):
             own = stage.ranges.anchor == index
             if own.sum() < LEAST_RANGES:
@@ -428,18 +429,15 @@ class _Work:
         )
 
 
-def _stage(
+def seen_from_knots(
     track: Track, knots: Indices, table: RangeTable, tag: tuple[float, float, float]
-) -> _Stage:
-    pieces = Pieces.of(track, knots)
-    knot = pieces.nearest(table.stamps)
+) -> TagRanges:
+    """Return ranges with their tag as seen from the nearest of the knots (rows of the track)."""
+    knot = Pieces.of(track, knots).nearest(table.stamps)
     seen = relative(track.at(table.stamps), track.poses[knots[knot]])
     flat = seen[:, :2] + rotated(np.broadcast_to(tag[:2], (len(seen), 2)), seen[:, 2])
     lever = np.column_stack([flat, np.full(len(flat), tag[2])])
-    ranges = TagRanges(
-        knot, table.anchor, lever, table.range_m, np.full(len(flat), RANGE_STD_M)
-    )
-    return _Stage(pieces, knots, ranges, flat)
+    return TagRanges(knot, table.anchor, lever, table.range_m, np.full(len(flat), RANGE_STD_M))
 
 
 def _width(track: Track) -> float:
