@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.odometry import MotionNoise
+from tablerunner.survey.drift import drift_priors, drift_times
 from tablerunner.survey.track import Pieces, rotated
 
 Array = NDArray[np.float64]
@@ -28,7 +30,7 @@ def noise_of(noise: MotionNoise) -> tuple[float, float, float, float]:
 
 @dataclass(frozen=True)
 class OdometryMotions:
-    """Motions between knots as odometry tells them; values: way, turns, drift."""
+    """Motions between knots as odometry tells them; values: way, turns, drift and its steps."""
 
     pieces: Pieces
     noise: MotionNoise
@@ -36,26 +38,29 @@ class OdometryMotions:
     @property
     def count(self) -> int:
         """Number of values that stand for what is read wrong."""
-        return 3
+        return 2 + self._times.shape[1]
+
+    @cached_property
+    def _times(self) -> Array:
+        return drift_times(self.pieces)
 
     @property
     def priors(self) -> Array:
-        """Standard deviations of those values, shape (3,)."""
-        return np.array([WAY_STD, TURN_STD, DRIFT_STD])
+        """Standard deviations of those values, shape (count,)."""
+        return np.concatenate([[WAY_STD, TURN_STD], drift_priors(self._times, DRIFT_STD)])
 
     def told(self, wrongs: Array) -> tuple[Array, Array]:
         """Return the motions, and their derivatives by way, turns and drift."""
-        way, turns, drift = wrongs
-        motions, time = self.pieces.motions, self.pieces.time
-        more = turns * motions[:, 2] + drift * time
+        motions, way = self.pieces.motions, float(wrongs[0])
+        rates = np.column_stack([motions[:, 2], self._times])
+        more = rates @ wrongs[1:]
         turned = rotated(motions[:, :2], 0.5 * more)
         told = np.column_stack([(1.0 + way) * turned, motions[:, 2] + more])
-        by = np.zeros((len(motions), 3, 3))
+        by = np.zeros((len(motions), 3, self.count))
         by[:, :2, 0] = turned
         by_turn = 0.5 * (1.0 + way) * np.column_stack([-turned[:, 1], turned[:, 0]])
-        for column, rate in ((1, motions[:, 2]), (2, time)):
-            by[:, :2, column] = rate[:, None] * by_turn
-            by[:, 2, column] = rate
+        by[:, :2, 1:] = by_turn[:, :, None] * rates[:, None, :]
+        by[:, 2, 1:] = rates
         return told, by
 
     def whiteners(self) -> tuple[Array, Array]:

@@ -157,8 +157,8 @@ class Survey:
     range_std_m : float
         Noise of a range that is not blocked.
     way, turns, drift : tuple of 2 floats
-        Share by which odometry tells way and turns too short, its drift [rad/s], each with its
-        standard deviation.
+        Share by which odometry tells way and turns too short, its drift in the beginning [rad/s],
+        each with its standard deviation.
     """
 
     anchors: tuple[SurveyedAnchor, ...]

@@ -130,7 +130,8 @@ class _Work:
         self._doubt: dict[int, Places] = {}
         self._stage: _Stage | None = None
         self._poses: Array = np.array([config.start])
-        self._wrongs: Array = np.zeros(3)
+        self._wrongs: Array = np.zeros(0)
+        self._layout = Layout(0, 0, 0)
         self._adjusted: Adjusted | None = None
 
     # -- before ---------------------------------------------------------------------------------
@@ -246,15 +247,18 @@ class _Work:
             stage.ranges.range_m[used],
             stage.ranges.std_m[used],
         )
-        layout = Layout(stage.pieces.count, len(self._ids), 3)
+        motions = OdometryMotions(stage.pieces, self._config.noise)
+        layout = self._layout = Layout(stage.pieces.count, len(self._ids), motions.count)
         problem = Problem(
             layout,
             ranges,
-            OdometryMotions(stage.pieces, self._config.noise),
+            motions,
             self._links(),
             self._priors(layout),
         )
-        start = np.concatenate([self._poses.ravel(), self._anchors.ravel(), self._wrongs])
+        wrongs = np.zeros(motions.count)
+        wrongs[: len(self._wrongs)] = self._wrongs
+        start = np.concatenate([self._poses.ravel(), self._anchors.ravel(), wrongs])
         try:
             done = adjust(
                 problem.rows, start, self._free(layout, gauge), KINDS, find_factors=find
@@ -370,7 +374,7 @@ class _Work:
     def _done(self) -> tuple[Adjusted, Layout]:
         if self._adjusted is None:
             raise RuntimeError('nothing was solved')
-        return self._adjusted, Layout(self._known_stage().pieces.count, len(self._ids), 3)
+        return self._adjusted, self._layout
 
     def result(self) -> Survey:
         """Return what came out; raise where an anchor is not certain enough."""

@@ -10,11 +10,13 @@ With angles a, b of the left and the right wheel since the start, radii r, s and
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.odometry import MotionNoise
+from tablerunner.survey.drift import drift_priors, drift_times
 from tablerunner.survey.odometry import noise_of
 from tablerunner.survey.track import FLOOR_RAD, Indices, Pieces, Track
 
@@ -108,7 +110,7 @@ def derivatives(wheels: WheelAngles, sizes: Sizes, knots: Indices) -> Array:
 class WheelMotions:
     """Motions by wheels of about these sizes; values: shares of left, right, track, then gyro.
 
-    Of the gyroscope: its scale, and its drift [rad/s].
+    Of the gyroscope: its scale, its drift, and the steps of that [rad/s].
     """
 
     wheels: WheelAngles
@@ -128,12 +130,17 @@ class WheelMotions:
     @property
     def count(self) -> int:
         """Number of values that stand for what is read wrong."""
-        return 3 if self.wheels.gyro is None else 5
+        return 3 if self.wheels.gyro is None else 4 + self._times.shape[1]
+
+    @cached_property
+    def _times(self) -> Array:
+        return drift_times(self.pieces)
 
     @property
     def priors(self) -> Array:
         """Standard deviations of those values, shape (count,)."""
-        return np.array([SIZE_STD] * 3 + [GYRO_SCALE_STD, GYRO_DRIFT_STD])[: self.count]
+        drift = drift_priors(self._times, GYRO_DRIFT_STD)
+        return np.concatenate([[SIZE_STD] * 3, [GYRO_SCALE_STD], drift])[: self.count]
 
     def told(self, wrongs: Array) -> tuple[Array, Array]:
         """Return the motions, and their derivatives."""
@@ -149,9 +156,8 @@ class WheelMotions:
         """Return the turns by the gyroscope, their derivatives, and their deviations."""
         if self.wheels.gyro is None:
             return None
-        scale, drift = wrongs[3:]
         raw = np.diff(self.wheels.gyro[self.knots])
         by = np.zeros((len(raw), self.count))
-        by[:, 3], by[:, 4] = -raw, -self.pieces.time
+        by[:, 3], by[:, 4:] = -raw, -self._times
         variance = self.noise.heading_per_time**2 * self.pieces.time + FLOOR_RAD**2
-        return raw * (1.0 - scale) - drift * self.pieces.time, by, np.sqrt(variance)
+        return raw + by @ wrongs, by, np.sqrt(variance)

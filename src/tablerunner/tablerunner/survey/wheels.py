@@ -40,6 +40,12 @@ KINDS = Kinds(
     robust=frozenset({RANGES}),
     doubtful=frozenset({ALONG, TURN}),
 )
+"""With a gyroscope, beside which wheels that slip stand out."""
+
+KINDS_OF_WHEELS = Kinds(
+    GROUPS, found=frozenset({RANGES, ALONG, TURN}), robust=frozenset({RANGES})
+)
+"""Without one: slips are part of the noise."""
 
 _ROUNDS = 6
 _SMALL_SHARE = 1e-5
@@ -99,8 +105,8 @@ class WheelFit:
         Of left radius, right radius, track [m^2].
     nominal : Sizes
     gyro_scale, gyro_drift : tuple of 2 floats, or None
-        Share by which the gyroscope tells turns too large, and its drift [rad/s], each with its
-        standard deviation; None without one.
+        Share by which the gyroscope tells turns too large, and its drift in the beginning
+        [rad/s], each with its standard deviation; None without one.
     range_std_m : float
         Noise of a range that is not blocked.
     ranges : int
@@ -231,8 +237,9 @@ class _Fit:
     def run(self, path: Array) -> WheelFit:
         """Return what came out, from a guess of the knots in map."""
         data, sizes = self._data, self._data.nominal
-        places, gyro = self._places, np.zeros(2)
+        places, gyro = self._places, np.zeros(0)
         factors: Array | None = None
+        kinds = KINDS_OF_WHEELS if data.wheels.gyro is None else KINDS
         for _ in range(_ROUNDS):
             track = integrated(data.wheels, sizes)
             table = data.ranges.within(track)
@@ -240,10 +247,11 @@ class _Fit:
             layout = Layout(len(self._rows), len(places), motions.count)
             ranges = seen_from_knots(track, self._rows, table, data.tag_position)
             problem = Problem(layout, ranges, motions, None, self._priors(layout))
-            wrongs = np.concatenate([np.zeros(3), gyro])[: motions.count]
+            wrongs = np.zeros(motions.count)
+            wrongs[3 : 3 + len(gyro)] = gyro
             start = np.concatenate([path.ravel(), places.ravel(), wrongs])
             try:
-                done = adjust(problem.rows, start, self._free(layout), KINDS, factors)
+                done = adjust(problem.rows, start, self._free(layout), kinds, factors)
             except GeometryError as error:
                 raise ConfigError('drive', str(error), 'a longer drive, round corners') from error
             path, places = layout.poses(done.values), layout.places(done.values)
@@ -289,7 +297,7 @@ class _Fit:
         gyro: list[tuple[float, float]] = [
             (float(done.values[i]), float(np.sqrt(done.covariance[i, i])))
             for i in range(first + 3, layout.size)
-        ]
+        ][:2]
         return WheelFit(
             sizes,
             block * np.outer(sizes.values, sizes.values),
