@@ -198,9 +198,7 @@ def _descend(
     return values, False
 
 
-def _weights(
-    scaled: Array, group: NDArray[np.intp], kinds: Kinds, redescending: bool
-) -> Array:
+def _weights(scaled: Array, group: NDArray[np.intp], kinds: Kinds, redescending: bool) -> Array:
     weight = np.ones_like(scaled)
     for number in kinds.robust | kinds.doubtful:
         own = group == number
@@ -235,9 +233,7 @@ def _inverse(rows: Rows, weight: Array, factors: Array, free: NDArray[np.bool_])
     return np.asarray(0.5 * (inverse + inverse.T))
 
 
-def _factors(
-    rows: Rows, free: NDArray[np.bool_], kinds: Kinds, factors: Array
-) -> Array:
+def _factors(rows: Rows, free: NDArray[np.bool_], kinds: Kinds, factors: Array) -> Array:
     """Return the noise of each group over what was believed."""
     scaled = rows.residual / factors[rows.group]
     weight = _weights(scaled, rows.group, kinds, True)

@@ -1,4 +1,4 @@
-"""What dead reckoning may read wrong all the time: scale of way and turns, drift of the heading."""
+"""What dead reckoning reads wrong all the time: scale of way and turns, drift of the heading."""
 
 from __future__ import annotations
 

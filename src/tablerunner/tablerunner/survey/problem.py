@@ -49,7 +49,7 @@ class Layout:
         """Return where the x of knots stands; y and heading follow."""
         return 3 * np.asarray(index, dtype=np.intp)
 
-    def anchor(self, index: Indices | int) -> Indices:
+    def anchor(self, index: Indices | np.intp | int) -> Indices:
         """Return where the x of anchors stands; y, z, bias, scale follow."""
         return 3 * self.knots + PER_ANCHOR * np.asarray(index, dtype=np.intp)
 
@@ -184,8 +184,9 @@ class _Part:
     group: int
 
     @classmethod
-    def of(cls, residual: Array, columns: Sequence[Indices], data: Sequence[Array], group: int
-           ) -> _Part:
+    def of(
+        cls, residual: Array, columns: Sequence[Indices], data: Sequence[Array], group: int
+    ) -> _Part:
         """Return the part of residuals that each depend on equally many values."""
         rows = np.arange(len(residual))
         return cls(

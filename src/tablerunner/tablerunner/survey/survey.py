@@ -1,13 +1,12 @@
 """Anchor places from a drive: ranges to the tag, odometry, and ranges between anchors.
 
-First a short stretch from the start, on which dead reckoning is good, then longer ones, each solved
-as a whole; an anchor joins as soon as its ranges leave one place only. docs/survey.md.
+First a short stretch from the start, on which dead reckoning is good, then longer ones, each
+solved as a whole; an anchor joins as soon as its ranges leave one place only. docs/survey.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,19 +28,18 @@ from tablerunner.survey.problem import (
 )
 from tablerunner.survey.record import (
     RANGE_STD_M,
-    RangeTable,
     Survey,
     SurveyConfig,
     SurveyData,
     SurveyedAnchor,
 )
 from tablerunner.survey.start import ALIKE, APART_M, Places, locate_anchor
+from tablerunner.survey.stretch import Stretch, seen_from_knots, width
 from tablerunner.survey.track import (
-    Indices,
     Pieces,
-    Track,
     choose_knots,
     composed,
+    laid_on,
     relative,
     rotated,
 )
@@ -93,15 +91,6 @@ def survey(data: SurveyData, config: SurveyConfig) -> Survey:
     return work.result()
 
 
-@dataclass(frozen=True)
-class _Stage:
-    """A stretch of the drive: knots, and the ranges as seen from them."""
-
-    pieces: Pieces
-    rows: Indices  # of the track, of each knot
-    ranges: TagRanges
-
-
 class _Work:
     """A survey under way."""
 
@@ -120,15 +109,12 @@ class _Work:
                 self._heights[self._ids.index(name)] = place[2]
         self._anchors[:, 2] = self._heights
         self._height_known = np.array(
-            [
-                name in config.heights or len(config.fixed.get(name, ())) == 3
-                for name in self._ids
-            ],
+            [name in config.heights or len(config.fixed.get(name, ())) == 3 for name in self._ids],
             dtype=bool,
         )
         self._placed: Flags = np.zeros(count, dtype=bool)
         self._doubt: dict[int, Places] = {}
-        self._stage: _Stage | None = None
+        self._stage: Stretch | None = None
         self._poses: Array = np.array([config.start])
         self._wrongs: Array = np.zeros(0)
         self._layout = Layout(0, 0, 0)
@@ -157,11 +143,11 @@ class _Work:
         way = float(self._data.track.way[-1])
         if way < LEAST_WAY_M:
             raise ConfigError('drive', f'{way:.1f} m', f'{LEAST_WAY_M:g} m or more, best 20 to 40')
-        width = _width(self._data.track)
-        if width < LEAST_WIDTH_M:
+        across = width(self._data.track)
+        if across < LEAST_WIDTH_M:
             raise ConfigError(
                 'drive',
-                f'{way:.1f} m straight, {width:.2f} m wide',
+                f'{way:.1f} m straight, {across:.2f} m wide',
                 'a drive round corners (best a loop): from a straight one the two sides of the '
                 'way look alike',
             )
@@ -199,7 +185,7 @@ class _Work:
         knots = choose_knots(track)
         table = self._table.within(track)
         ranges = seen_from_knots(track, knots, table, self._data.tag_position)
-        new = _Stage(Pieces.of(track, knots), knots, ranges)
+        new = Stretch(Pieces.of(track, knots), knots, ranges)
         if self._stage is None:
             origin = np.broadcast_to(track.poses[:1], (len(knots), 3))
             seen = relative(track.poses[knots], origin)
@@ -260,9 +246,7 @@ class _Work:
         wrongs[: len(self._wrongs)] = self._wrongs
         start = np.concatenate([self._poses.ravel(), self._anchors.ravel(), wrongs])
         try:
-            done = adjust(
-                problem.rows, start, self._free(layout, gauge), KINDS, find_factors=find
-            )
+            done = adjust(problem.rows, start, self._free(layout, gauge), KINDS, find_factors=find)
         except GeometryError as error:
             raise ConfigError('drive', str(error), 'a longer drive, round corners') from error
         self._poses = layout.poses(done.values)
@@ -323,7 +307,7 @@ class _Work:
             np.array(std),
         )
 
-    def _known_stage(self) -> _Stage:
+    def _known_stage(self) -> Stretch:
         if self._stage is None:
             raise RuntimeError('no stretch was entered')
         return self._stage
@@ -353,11 +337,9 @@ class _Work:
                     f'{names[0]} and {names[one]} {told:.2f} m apart',
                     f'places about {seen:.2f} m apart, as the ranges say (within {slack:.2f} m)',
                 )
-        a, b = found - found.mean(axis=0), given - given.mean(axis=0)
-        angle = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
+        _, (before, after, angle) = laid_on(found, given)
         for place in (self._anchors, self._poses):
-            turned = rotated(place[:, :2] - found.mean(axis=0), np.full(len(place), angle))
-            place[:, :2] = turned + given.mean(axis=0)
+            place[:, :2] = rotated(place[:, :2] - before, np.full(len(place), angle)) + after
         self._poses[:, 2] += angle
         self._anchors[index, :2] = given
 
@@ -398,7 +380,7 @@ class _Work:
                 int(counts[index]),
                 float(np.mean(weights[own] < BLOCKED_WEIGHT)),
             )
-            if float(item.std[:2].max()) > WORST_STD_M:
+            if float(np.max(item.std[:2])) > WORST_STD_M:
                 raise ConfigError(
                     f'anchor {name}',
                     f'standard deviation {item.std[:2].max():.2f} m',
@@ -431,24 +413,3 @@ class _Work:
             turns,
             drift,
         )
-
-
-def seen_from_knots(
-    track: Track, knots: Indices, table: RangeTable, tag: tuple[float, float, float]
-) -> TagRanges:
-    """Return ranges with their tag as seen from the nearest of the knots (rows of the track)."""
-    knot = Pieces.of(track, knots).nearest(table.stamps)
-    seen = relative(track.at(table.stamps), track.poses[knots[knot]])
-    flat = seen[:, :2] + rotated(np.broadcast_to(tag[:2], (len(seen), 2)), seen[:, 2])
-    lever = np.column_stack([flat, np.full(len(flat), tag[2])])
-    return TagRanges(knot, table.anchor, lever, table.range_m, np.full(len(flat), RANGE_STD_M))
-
-
-def _width(track: Track) -> float:
-    """Return how wide the way is, across its longest direction [m]."""
-    places = track.poses[:, :2] - track.poses[:, :2].mean(axis=0)
-    across = np.linalg.svd(places, full_matrices=False)[2][1]
-    return float(np.ptp(places @ across))
-
-
-

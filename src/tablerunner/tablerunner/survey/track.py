@@ -88,6 +88,17 @@ def rotated(vectors: Array, angles: Array) -> Array:
     return np.column_stack([cos * x - sin * y, sin * x + cos * y])
 
 
+def laid_on(here: Array, there: Array) -> tuple[Array, tuple[Array, Array, float]]:
+    """Return points moved and turned, not stretched, onto others, shapes (n, 2).
+
+    Besides, how: what is taken off first, what is added in the end, and the turn [rad].
+    """
+    one, two = here.mean(axis=0), there.mean(axis=0)
+    a, b = here - one, there - two
+    angle = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
+    return rotated(a, np.full(len(a), angle)) + two, (one, two, angle)
+
+
 def relative(poses: Array, origins: Array) -> Array:
     """Return poses as seen from others, row by row: shapes (n, 3)."""
     apart = rotated(poses[:, :2] - origins[:, :2], -origins[:, 2])

@@ -21,8 +21,9 @@ from tablerunner.survey.problem import (
     Problem,
 )
 from tablerunner.survey.record import RANGE_STD_M, RangeTable, SurveyConfig, SurveyData
-from tablerunner.survey.survey import LEAST_RANGES, seen_from_knots, survey
-from tablerunner.survey.track import Indices, Track, choose_knots, rotated
+from tablerunner.survey.stretch import seen_from_knots
+from tablerunner.survey.survey import LEAST_RANGES, survey
+from tablerunner.survey.track import Indices, Track, choose_knots, laid_on, rotated
 from tablerunner.survey.wheel_motion import Sizes, WheelAngles, WheelMotions, integrated
 from tablerunner.types import Anchor
 
@@ -42,9 +43,7 @@ KINDS = Kinds(
 )
 """With a gyroscope, beside which wheels that slip stand out."""
 
-KINDS_OF_WHEELS = Kinds(
-    GROUPS, found=frozenset({RANGES, ALONG, TURN}), robust=frozenset({RANGES})
-)
+KINDS_OF_WHEELS = Kinds(GROUPS, found=frozenset({RANGES, ALONG, TURN}), robust=frozenset({RANGES}))
 """Without one: slips are part of the noise."""
 
 _ROUNDS = 6
@@ -204,17 +203,15 @@ def _first_path(data: WheelData, config: WheelConfig, known: dict[str, Anchor]) 
     )
     there = np.array([known[item.anchor_id].position[:2] for item in found.anchors])
     here = found.positions[:, :2]
-    a, b = here - here.mean(axis=0), there - there.mean(axis=0)
-    angle = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
-    off = np.linalg.norm(rotated(a, np.full(len(a), angle)) - b, axis=1)
+    laid, (before, after, angle) = laid_on(here, there)
+    off = np.linalg.norm(laid - there, axis=1)
     if off.max() > _WORST_MISFIT_M + 4.0 * max(float(i.std[:2].max()) for i in found.anchors):
         worst = found.anchors[int(np.argmax(off))].anchor_id
         raise ConfigError(
             f'anchor {worst}', f'{off.max():.2f} m off', 'places that the ranges agree with'
         )
-    path = found.path
-    moved = rotated(path[:, :2] - here.mean(axis=0), np.full(len(path), angle))
-    return np.column_stack([moved + there.mean(axis=0), path[:, 2] + angle])
+    moved = rotated(found.path[:, :2] - before, np.full(len(found.path), angle)) + after
+    return np.column_stack([moved, found.path[:, 2] + angle])
 
 
 def _often(data: WheelData, name: str) -> bool:
@@ -315,5 +312,6 @@ class _Fit:
 def _laid(track: Track, start: Array) -> Array:
     """Return a track's poses from a start in map on."""
     angle = np.full(len(track.poses), start[2])
-    return np.column_stack([rotated(track.poses[:, :2], angle) + start[:2],
-                            track.poses[:, 2] + start[2]])
+    return np.column_stack(
+        [rotated(track.poses[:, :2], angle) + start[:2], track.poses[:, 2] + start[2]]
+    )
