@@ -147,7 +147,7 @@ def adjust(
         before = known.copy()
         known = _factors(rows_at(values), free, kinds, known)
         values, settled = _descend(rows_at, values, free, kinds, known, redescending=True)
-        if np.all(np.abs(np.log(known / before)) < 0.02):
+        if np.all(np.abs(np.log(known / before)) < 0.05):
             break
     rows = rows_at(values)
     scaled = rows.residual / known[rows.group]
@@ -239,7 +239,7 @@ def _factors(rows: Rows, free: NDArray[np.bool_], kinds: Kinds, factors: Array) 
     weight = _weights(scaled, rows.group, kinds, True)
     inverse = _inverse(rows, weight, factors, free)
     leverage = _leverage(rows.jacobian[:, free], inverse) * weight / factors[rows.group] ** 2
-    found = factors.copy()
+    found: Array = factors.copy()
     for number in kinds.found:
         own = rows.group == number
         if not own.any():
@@ -250,7 +250,7 @@ def _factors(rows: Rows, free: NDArray[np.bool_], kinds: Kinds, factors: Array) 
             middle = np.median(scaled[own])
             below = middle - scaled[own][scaled[own] < middle] if number in kinds.robust else None
             size = np.abs(scaled[own]) if below is None else below
-            std = MAD_TO_SIGMA * float(np.median(size)) * np.sqrt(own.sum() / redundancy)
+            std = MAD_TO_SIGMA * float(np.median(size) * np.sqrt(own.sum() / redundancy))
         else:
             std = float(np.sqrt(np.sum(scaled[own] ** 2) / redundancy))
         found[number] = np.clip(factors[number] * std, *_FACTOR_LIMITS)

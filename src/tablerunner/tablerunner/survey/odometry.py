@@ -38,7 +38,7 @@ class OdometryMotions:
     @property
     def count(self) -> int:
         """Number of values that stand for what is read wrong."""
-        return 2 + self._times.shape[1]
+        return 2 + int(self._times.shape[1])
 
     @cached_property
     def _times(self) -> Array:
@@ -63,10 +63,10 @@ class OdometryMotions:
         by[:, 2, 1:] = rates
         return told, by
 
-    def whiteners(self) -> tuple[Array, Array]:
+    def whiteners(self) -> tuple[Array, Array, Array]:
         """Return `Pieces.whiteners` of the motions."""
         return self.pieces.whiteners(noise_of(self.noise))
 
-    def turns(self, wrongs: Array) -> tuple[Array, Array, Array] | None:
+    def turns(self, wrongs: Array) -> None:
         """Return nothing: what the gyroscope said is in the odometry already."""
         del wrongs

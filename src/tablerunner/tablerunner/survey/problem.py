@@ -24,9 +24,9 @@ from tablerunner.survey.track import rotated
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-RANGES, ALONG, TURN, GYRO, LINKS = 1, 2, 3, 4, 5
-GROUPS = 6
-"""Groups of residuals: ranges, way and turn of the motions, gyroscope, anchor to anchor."""
+RANGES, ALONG, TURN, ACROSS, GYRO, LINKS = 1, 2, 3, 4, 5, 6
+GROUPS = 7
+"""Groups of residuals: ranges; motions along, in turn and across; gyroscope; between anchors."""
 
 PER_ANCHOR = 5
 _FROM_HEADING = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -123,7 +123,7 @@ class Motions(Protocol):
     def told(self, wrongs: Array) -> tuple[Array, Array]:
         """Return the motions, shape (k, 3), and their derivatives, shape (k, 3, count)."""
 
-    def whiteners(self) -> tuple[Array, Array]:
+    def whiteners(self) -> tuple[Array, Array, Array]:
         """Return `Pieces.whiteners` of the motions."""
 
     def turns(self, wrongs: Array) -> tuple[Array, Array, Array] | None:
@@ -238,12 +238,10 @@ def _motions(layout: Layout, motions: Motions, values: Array) -> list[_Part]:
     columns = [at, at + 1, at + 2, at + 3, at + 4, at + 5]
     columns += [np.full(count, layout.first_motion + i) for i in range(motions.count)]
     parts = []
-    for white, group in zip(motions.whiteners(), (ALONG, TURN), strict=True):
-        for number in range(white.shape[1]):
-            row = white[:, number]
-            residual = np.einsum('ki,ki->k', row, error)
-            by = np.einsum('ki,kij->kj', row, slope)
-            parts.append(_Part.of(residual, columns, list(by.T), group))
+    for white, group in zip(motions.whiteners(), (ALONG, TURN, ACROSS), strict=True):
+        residual = np.einsum('ki,ki->k', white, error)
+        by = np.einsum('ki,kij->kj', white, slope)
+        parts.append(_Part.of(residual, columns, list(by.T), group))
     gyro = motions.turns(wrongs)
     if gyro is not None:
         turns, by_gyro, std = gyro

@@ -316,7 +316,7 @@ class _Work:
 
     def finish(self) -> None:
         """Solve the whole drive with its noise, in the frame that was asked for."""
-        self._solve(find=True)
+        self._solve(find=not self._config.fixed)
         if self._config.fixed:
             self._move_to_given()
             self._solve(find=True, gauge=True)
@@ -351,7 +351,7 @@ class _Work:
         for index, sign in ((one, -1.0), (two, 1.0)):
             at = int(layout.anchor(index))
             slope[at : at + 2] = sign * unit
-        return float(np.sqrt(max(slope @ done.covariance @ slope, 0.0)))
+        return float(np.sqrt(max(float(slope @ done.covariance @ slope), 0.0)))
 
     def _done(self) -> tuple[Adjusted, Layout]:
         if self._adjusted is None:
@@ -380,7 +380,7 @@ class _Work:
                 int(counts[index]),
                 float(np.mean(weights[own] < BLOCKED_WEIGHT)),
             )
-            if float(np.max(item.std[:2])) > WORST_STD_M:
+            if float(np.sqrt(block[:2, :2].diagonal().max())) > WORST_STD_M:
                 raise ConfigError(
                     f'anchor {name}',
                     f'standard deviation {item.std[:2].max():.2f} m',

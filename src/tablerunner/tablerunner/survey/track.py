@@ -156,7 +156,7 @@ class Pieces:
         nearer = stamps - self.stamps[after - 1] <= self.stamps[after] - stamps
         return np.asarray(after - nearer, dtype=np.intp)
 
-    def whiteners(self, noise: tuple[float, float, float, float]) -> tuple[Array, Array]:
+    def whiteners(self, noise: tuple[float, float, float, float]) -> tuple[Array, Array, Array]:
         """Return what makes the errors of the motions independent and of size one.
 
         Along the chord and across it; the error across grows out of that of the heading: with
@@ -169,9 +169,9 @@ class Pieces:
 
         Returns
         -------
-        along : ndarray, shape (k - 1, 1, 3)
-        turn : ndarray, shape (k - 1, 2, 3)
-            Times x, y, turn of an error in the frame of the first knot.
+        along, turn, across : ndarray, shape (k - 1, 3)
+            Times x, y, turn of an error in the frame of the first knot; across what the turn
+            explains.
         """
         distance, per_turn, per_way, per_time = noise
         chord = np.linalg.norm(self.motions[:, :2], axis=1)
@@ -185,14 +185,14 @@ class Pieces:
         )
         cos, sin = np.cos(course), np.sin(course)
         zero = np.zeros_like(cos)
-        along = np.stack([cos, sin, zero], axis=1)[:, None] / along_std[:, None, None]
+        along = np.stack([cos, sin, zero], axis=1) / along_std[:, None]
         across = np.stack([-sin, cos, zero], axis=1)
         spin = np.stack([zero, zero, zero + 1.0], axis=1)
         turn_std = np.sqrt(variance)
         # Across, given the turn: half the chord of it, and what is left.
         left = np.sqrt(variance * chord**2 / 12.0 + FLOOR_M**2)
-        conditional = (across - 0.5 * chord[:, None] * spin) / left[:, None]
-        return along, np.stack([conditional, spin / turn_std[:, None]], axis=1)
+        across = (across - 0.5 * chord[:, None] * spin) / left[:, None]
+        return along, spin / turn_std[:, None], across
 
 
 FLOOR_M = 0.001

@@ -130,7 +130,7 @@ class WheelMotions:
     @property
     def count(self) -> int:
         """Number of values that stand for what is read wrong."""
-        return 3 if self.wheels.gyro is None else 4 + self._times.shape[1]
+        return 3 if self.wheels.gyro is None else 4 + int(self._times.shape[1])
 
     @cached_property
     def _times(self) -> Array:
@@ -148,7 +148,7 @@ class WheelMotions:
         by[:, :, :3] = self.slopes
         return self.pieces.motions + by @ wrongs, by
 
-    def whiteners(self) -> tuple[Array, Array]:
+    def whiteners(self) -> tuple[Array, Array, Array]:
         """Return `Pieces.whiteners` of the motions."""
         return self.pieces.whiteners(noise_of(self.noise))
 
