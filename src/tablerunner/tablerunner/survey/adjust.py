@@ -34,6 +34,7 @@ _STEPS = 40
 _SMALL = 1e-7
 _FACTOR_ROUNDS = 8
 _ROWS_AT_ONCE = 2000
+_NEAR = 3.0
 _FACTOR_LIMITS = (0.25, 50.0)
 """Where the data hardly tell the noise of a group it may come out as nothing, and certainty as too
 large: it is never believed to be more than four times smaller than was said."""
@@ -246,10 +247,15 @@ def _factors(rows: Rows, free: NDArray[np.bool_], kinds: Kinds, factors: Array) 
             continue
         redundancy = max(float(np.sum(1.0 - leverage[own])), 1.0)
         if number in kinds.robust or number in kinds.doubtful:
-            # From what lies below the middle: nothing that stands in the way makes a range short.
-            middle = np.median(scaled[own])
-            below = middle - scaled[own][scaled[own] < middle] if number in kinds.robust else None
-            size = np.abs(scaled[own]) if below is None else below
+            size = np.abs(scaled[own])
+            if number in kinds.robust:
+                # From what lies below the middle: nothing that stands in the way makes a range
+                # short. Blunders that are known by now do not shift the middle.
+                near = scaled[own][size < _NEAR]
+                middle = np.median(near) if len(near) else 0.0
+                size = middle - near[near < middle]
+            if not len(size):
+                continue
             std = MAD_TO_SIGMA * float(np.median(size) * np.sqrt(own.sum() / redundancy))
         else:
             std = float(np.sqrt(np.sum(scaled[own] ** 2) / redundancy))
