@@ -46,7 +46,7 @@ def test_a_straight_way_leaves_both_sides() -> None:
 def test_blocked_ranges_do_not_move_it() -> None:
     place = np.array([-2.0, 6.0])
     ranges = ranges_to(place, BENT, 1.2, 2)
-    ranges[10:45] += 1.0
+    ranges[10:50:3] += 1.0
     found = locate_anchor(BENT, 1.2, ranges)
     assert found.other is None
     assert np.linalg.norm(found.place - place) < 0.25
