@@ -128,9 +128,9 @@ def rewritten(
     with BagReader(source) as reader, BagWriter(target) as writer:
         for topic in topics:
             writer.add_topic(topic, CONTRACT[topic].msgtype, CONTRACT[topic].quality)
-        for item in reader.messages([f'/{topic}' for topic in topics]):
-            for message in change(item.message):
-                writer.write(item.topic, item.received, message)
+        for topic, received, _, original in reader.messages([f'/{name}' for name in topics]):
+            for message in change(original):
+                writer.write(topic, received, message)
     return target
 
 

@@ -68,15 +68,15 @@ def test_biases_are_found_as_far_as_they_show(drives: list[Recorded]) -> None:
 
 
 def test_blocked_ranges_are_left_out(drives: list[Recorded]) -> None:
-    """A quarter of one anchor's ranges, in a row, by up to a metre: found, and no harm done."""
+    """A tenth of one anchor's ranges, in a row, by up to a metre: found, and no harm done."""
     data = drives[3].data
     own = np.flatnonzero(data.ranges.anchor == 2)
-    some = own[len(own) // 4 : len(own) // 2]
+    some = own[len(own) // 4 : len(own) // 4 + len(own) // 10]
     ranges = data.ranges.range_m.copy()
     ranges[some] += np.random.default_rng(0).uniform(0.4, 1.0, len(some))
     found = survey(replace(data, ranges=replace(data.ranges, range_m=ranges)), CONFIG)
     assert judge(found).rms < 0.05
-    assert found.anchors[2].blocked == pytest.approx(0.25, abs=0.06)
+    assert found.anchors[2].blocked == pytest.approx(0.1, abs=0.03)
 
 
 def test_ranges_between_anchors_make_it_more_certain(drives: list[Recorded]) -> None:
@@ -145,5 +145,5 @@ def test_two_sides_that_look_alike_are_named() -> None:
     track = Track(stamps, np.column_stack([along, aside, heading]))
     data = SurveyData(track, table, (0.0, 0.0, 0.0))
     heights = dict.fromkeys('ABC', 0.0)
-    with pytest.raises(ConfigError, match=r'anchor B.*as well as.*round corners'):
+    with pytest.raises(ConfigError, match=r'anchor [ABC].*as well as.*round corners'):
         survey(data, SurveyConfig(heights=heights))

@@ -29,11 +29,11 @@ from tablerunner.types import Anchor, OdometrySample, WheelSample
 @pytest.fixture(scope='module')
 def winding() -> list[Recorded]:
     """Return drives with wheels that are off by 2 %, a track by 4 %, and slips."""
-    return recorded(SensorErrors(wheels=WHEEL_ERRORS), range(10), WINDING)
+    return recorded(SensorErrors(wheels=WHEEL_ERRORS), range(6), WINDING)
 
 
 def test_sizes_are_right_and_say_how_right(winding: list[Recorded]) -> None:
-    """Errors of ten drives against what is stated, from both sides."""
+    """Errors of six drives against what is stated, from both sides."""
     judged, spread = [], []
     for drive in winding:
         fit = fit_wheels(wheel_data(drive), WheelConfig())
