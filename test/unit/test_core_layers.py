@@ -18,6 +18,7 @@ PARTS = [
     'uwb',
     'odometry',
     'vision',
+    'survey',
     'estimation',
     'control',
     'simulation',

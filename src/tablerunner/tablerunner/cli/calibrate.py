@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 import typer
 
 from tablerunner.cli.calibrate_camera import camera
+from tablerunner.cli.calibrate_wheels import wheels
 from tablerunner.errors import ConfigError, GeometryError
 
 if TYPE_CHECKING:
@@ -21,17 +22,18 @@ WORST_NOISE_M = 0.5
 """No radio's ranges scatter as much: the true places must be wrong."""
 
 calibrate_app = typer.Typer(
-    help='Find what sensors read wrong: ranges from a bag, a camera from pictures.',
+    help='Find what sensors read wrong: ranges and wheels from a bag, a camera from pictures.',
     no_args_is_help=True,
 )
 
 
 @calibrate_app.callback()
 def calibrate() -> None:
-    """Find what sensors read wrong: ranges from a bag, a camera from pictures."""
+    """Find what sensors read wrong: ranges and wheels from a bag, a camera from pictures."""
 
 
 calibrate_app.command()(camera)
+calibrate_app.command()(wheels)
 
 
 @calibrate_app.command()

@@ -21,6 +21,7 @@ from tablerunner.cli.plot import plot
 from tablerunner.cli.replay import replay
 from tablerunner.cli.reproduce import reproduce
 from tablerunner.cli.stop_test import stop_test
+from tablerunner.cli.survey_anchors import survey_anchors
 from tablerunner.cli.tune import tune
 from tablerunner.errors import BagError, ConfigError, TablerunnerError
 
@@ -49,6 +50,7 @@ def make_app() -> typer.Typer:
     app.command()(stop_test)
     app.command()(explain_rule)
     app.command()(follow_test)
+    app.command()(survey_anchors)
     app.add_typer(convert_app, name='convert')
     app.add_typer(calibrate_app, name='calibrate')
     for entry in sorted(entry_points(group=GROUP), key=lambda item: item.name):

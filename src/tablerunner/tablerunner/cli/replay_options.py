@@ -16,12 +16,18 @@ SCENARIO_FILE = 'scenario.yaml'
 
 def find_scenario(bag: Path, given: Path | None) -> Scenario | None:
     """Return the scenario that was given, else the one that lies in or beside the bag."""
+    file = find_scenario_file(bag, given)
+    return None if file is None else load_scenario(file)
+
+
+def find_scenario_file(bag: Path, given: Path | None) -> Path | None:
+    """Return the file that `find_scenario` reads."""
     if given is not None:
-        return load_scenario(given)
+        return given
     folders = (bag, bag.parent) if bag.is_dir() else (bag.parent,)
     for folder in folders:
         if (folder / SCENARIO_FILE).is_file():
-            return load_scenario(folder / SCENARIO_FILE)
+            return folder / SCENARIO_FILE
     return None
 
 

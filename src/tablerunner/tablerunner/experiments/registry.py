@@ -20,6 +20,7 @@ from tablerunner.experiments.nlos import run_nlos
 from tablerunner.experiments.pf_uiekf import run_pf_uiekf
 from tablerunner.experiments.sun2019 import run_sun2019
 from tablerunner.experiments.sun2019_track import run_sun2019_track
+from tablerunner.experiments.survey import run_survey
 
 EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
     {
@@ -34,6 +35,7 @@ EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
         'nlos': run_nlos,
         'ceiling_camera': run_camera,
         'camera_limits': run_limits,
+        'survey': run_survey,
     }
 )
 

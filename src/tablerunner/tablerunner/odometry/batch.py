@@ -120,7 +120,7 @@ def dead_reckon(
     turn = (rolled[:, 1] - rolled[:, 0]) / config.wheels.track
     missing = np.zeros_like(turn)
     if config.heading_source == 'gyro':
-        angles = _angles(config.gyro, stamps, imu_stamps, yaw_rate)
+        angles = gyro_angles(config.gyro, stamps, imu_stamps, yaw_rate)
         turn, missing = _turns_by_gyro(config, stamps, distance, turn, angles)
     heading = np.concatenate([np.zeros_like(turn[:1]), np.cumsum(turn, axis=0)])
     course = heading[:-1] + 0.5 * turn
@@ -194,7 +194,7 @@ class _Slips:
         return np.where(slipping, self._missing_m**2 - before**2, 0.0)
 
 
-def _angles(
+def gyro_angles(
     config: GyroConfig, stamps: Stamps, imu_stamps: Stamps, yaw_rate: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return the integral of the yaw rate at each stamp, (k, runs), and where it is fresh, (k,).
