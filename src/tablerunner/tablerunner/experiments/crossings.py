@@ -77,8 +77,7 @@ def run_crossings(seeds: Sequence[int], progress: Progress) -> Outcome:
             'not found, by reason': [run.tally.refused for run in runs],
         },
         (
-            'A pose counts as of the wrong robot when another robot is nearer to it than its own, '
-            f'or its own farther off than {MISTAKEN_M:g} m.',
+            f'A pose more than {MISTAKEN_M:g} m (a radius) from its robot counts as of another.',
             'They cross when the direction from one to the other swings by more than 90 degrees '
             f'between coming nearer than {NEAR_M:g} m and being {AWAY_M:g} m apart.',
             'Robots are driven along their legs by the truth; estimates are of the live filter at '

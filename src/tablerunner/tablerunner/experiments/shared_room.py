@@ -50,7 +50,6 @@ from tablerunner.vision import (
     CeilingLocator,
     LocatorConfig,
     MarkerConfig,
-    Observation,
     draw_overlay,
 )
 
@@ -76,7 +75,8 @@ COMMAND_S = 0.05
 
 SOURCES = {'camera and UWB': (PoseSample, RangeSample), 'camera': (PoseSample,)}
 MISTAKEN_M = 0.25
-"""A pose farther than this from where its robot is, is of something else: a robot's radius."""
+"""A pose farther than this from where its robot is, is of something else: a robot's radius. Every
+pose that is nearer to another robot is, since robots are two radii apart."""
 
 
 def room() -> Scenario:
@@ -292,19 +292,14 @@ class Serving:
                 continue
             self.tally.found += 1
             self.tally.found_near += gaps[name] < NEAR_M
-            self._judge(item, truths)
+            off = item.sample.pose.distance_to(truths[name])
+            self.tally.place_errors.append(off)
+            self.tally.mistaken += off > MISTAKEN_M
             self.stacks[name].add_pose(item.sample)
         if min(gaps.values()) < self._closest:
             self._closest = min(gaps.values())
             marker = self.locator.config.marker
             self.view = draw_overlay(image.pixels, self.locator.camera, marker, found)
-
-    def _judge(self, seen: Observation, truths: dict[str, Pose2]) -> None:
-        pose = seen.sample.pose
-        off = {name: pose.distance_to(truth) for name, truth in truths.items()}
-        own = off[seen.robot]
-        self.tally.place_errors.append(own)
-        self.tally.mistaken += own > MISTAKEN_M or own > min(off.values())
 
 
 def locator_of(scenario: Scenario) -> CeilingLocator:
