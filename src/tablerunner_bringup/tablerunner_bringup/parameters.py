@@ -15,10 +15,13 @@ from tablerunner_bringup.run_options import RunOptions
 
 Parameters = dict[str, Any]
 
+_EPOCH_ROUNDS = 1.5
+"""Rounds of all anchors that a fix of the UWB alone may gather, as its default does at 10 Hz."""
+
 
 def uwb_driver(scenario: Scenario, options: RunOptions) -> Parameters:
-    """Return where the anchors hang."""
-    return {
+    """Return where the anchors hang and, where several tags take turns, how long a fix gathers."""
+    told: Parameters = {
         **_common(options),
         'anchor_ids': [anchor.id for anchor in scenario.anchors],
         'anchor_positions': [
@@ -26,6 +29,9 @@ def uwb_driver(scenario: Scenario, options: RunOptions) -> Parameters:
         ],
         'tag_height': float(scenario.robot.tag_position[2]),
     }
+    if options.robots > 1:
+        told['epoch'] = round(_EPOCH_ROUNDS * options.robots / scenario.sensors.uwb.rate, 3)
+    return told
 
 
 def person_driver(scenario: Scenario, options: RunOptions) -> Parameters:

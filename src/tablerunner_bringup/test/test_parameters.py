@@ -152,6 +152,10 @@ def test_parameters_of_several_robots(tmp_path):
         assert fusion.options.namespace == f'robot_{number}'
         assert fusion.parameters['initial_pose'] == start
         assert found[f'robot_{number}/nav_controller'].parameters['robot'] == f'robot_{number}'
+    # Two tags share 10 rounds of the anchors a second: one round takes each 0.2 s.
+    driver = found['robot_1/uwb_driver'].parameters
+    assert driver['epoch'] == 0.3
+    build(PositionerConfig, Document({'epoch': driver['epoch']}))
     camera = found['ceiling_camera']
     assert camera.options.namespace == ''
     assert camera.parameters['pose_topics'] == ['robot_1/camera/pose', 'robot_2/camera/pose']
@@ -200,3 +204,4 @@ def test_parameters_without_robots_are_those_of_one(odd):
     told = parameters.ceiling_camera(bistro, options)
     assert told['marker']['robots'] == ['robot']
     assert 'pose_topics' not in told
+    assert 'epoch' not in parameters.uwb_driver(bistro, options)
