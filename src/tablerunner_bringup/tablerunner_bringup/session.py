@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
+from rclpy.context import Context
 from rclpy.node import Node
 
 from tablerunner.cli.console import Progress
@@ -25,7 +26,7 @@ from tablerunner_bringup.interrupts import Interrupts
 from tablerunner_bringup.large_messages import allow_large_messages
 from tablerunner_bringup.monitor import Monitor
 from tablerunner_bringup.nodes import COMMANDING, RunNode, run_nodes
-from tablerunner_bringup.polling import bare_node
+from tablerunner_bringup.polling import bare_context, bare_node
 from tablerunner_bringup.run_folder import RunFolder
 from tablerunner_bringup.run_options import RunOptions
 from tablerunner_bringup.supervisor import StopLimits, Supervisor
@@ -106,6 +107,7 @@ class Session:
         self._nodes = run_nodes(options, scenario)
         self._stack = contextlib.ExitStack()
         self._domain: int | None = None
+        self._context: Context | None = None
         self._up_at = time.monotonic()
         self._up_stamp: int | None = None
 
@@ -130,6 +132,7 @@ class Session:
         if self._scenario.camera is not None:
             allow_large_messages(os.environ)
         self._domain = self._choose_domain()
+        self._context = self._stack.enter_context(bare_context(self._domain))
         self._progress.say(f'run in {self.folder.path}, ROS domain {self._domain_words}')
         self.monitor = Monitor(self.node('tablerunner_launcher'))
         for robot in dict.fromkeys(node.options.robot for node in self._nodes):
@@ -161,7 +164,9 @@ class Session:
         It ends with the run.
         """
         namespace = f'{self._options.namespace}/{robot}'.strip('/')
-        return self._stack.enter_context(bare_node(name, self._domain, namespace))
+        return self._stack.enter_context(
+            bare_node(name, namespace=namespace, context=self._context)
+        )
 
     @property
     def _domain_words(self) -> str:
