@@ -222,7 +222,9 @@ class Session:
 
     def _wait_until_up(self) -> None:
         waiting = {node.label: node for node in self._nodes}
-        deadline = time.monotonic() + self._settings.up_limit_s
+        # Each robot has as many nodes as a whole run without the others.
+        limit_s = self._settings.up_limit_s * max(self._options.robots, 1)
+        deadline = time.monotonic() + limit_s
         while waiting:
             self.tick()
             self._raise_when_interrupted()
@@ -234,8 +236,7 @@ class Session:
             if waiting and time.monotonic() > deadline:
                 logs = ', '.join(str(self.folder.log(label)) for label in sorted(waiting))
                 raise NotUpError(
-                    f'{", ".join(sorted(waiting))} not up after {self._settings.up_limit_s:g} s; '
-                    f'see {logs}'
+                    f'{", ".join(sorted(waiting))} not up after {limit_s:g} s; see {logs}'
                 )
             time.sleep(_TICK_S)
 
