@@ -51,7 +51,10 @@ class NavNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('nav_controller', **options)
         self._config = config = declare_config(self, NavNodeConfig, on_change=self._configure)
-        self._scenario = scenario = load_scenario(config.scenario)
+        scenario = load_scenario(config.scenario)
+        if config.robot:
+            scenario = scenario.seen_by(scenario.member(config.robot))
+        self._scenario = scenario
         self._parts = assemble(config, scenario)
         self._mission = self._parts.mission
         self._battery = Battery(config.battery)

@@ -32,6 +32,9 @@ class NavNodeConfig(Config):
     """Everything about nav_controller."""
 
     scenario: str = parameter(description='Scenario file: walls, tables, robot')
+    robot: str = parameter(
+        '', description="Which of the scenario's robots this is; empty: the one at its start"
+    )
     map_frame: str = parameter('map', description='Frame of goals and poses')
     odom_frame: str = parameter('odom', description='Frame of odom, for following a person')
     base_frame: str = parameter('base_link', description='Frame of the robot')

@@ -1,8 +1,8 @@
-"""The topics that the simulated robot publishes: one outlet per kind of sample."""
+"""The topics of the simulation: those of the room, and those of each robot."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -35,28 +35,67 @@ from tablerunner_ros.conversions.wheels import wheels_to_message
 from tablerunner_ros.qos import qos_for
 
 
-class Outlets:
-    """Publishers of the simulated robot.
+class RoomOutlets:
+    """Publishers of what all robots share: the time, people, the camera's pictures.
 
     Parameters
     ----------
     node : rclpy.node.Node
     config : BridgeConfig
     scenario : Scenario
-        Its robot's ultrasonic sensors have a topic each, ``ultrasonic/NAME``; what its robot's tag
-        ranges is on ``uwb/exchanges``, what people's tags range on ``person/exchanges``; a
-        camera's pictures come with its lens as it was measured, not as it is.
+        A camera's pictures come with its lens as it was measured, not as it is.
     """
 
     def __init__(self, node: Node, config: BridgeConfig, scenario: Scenario) -> None:
         self._config = config
-        self._tag_id = scenario.tag_id
-
-        def topic(type_: type[Any], name: str) -> Callable[[Any], None]:
-            return node.create_publisher(type_, name, qos_for(name)).publish
-
+        topic = _topics(node, '')
         self._clock = topic(Clock, 'clock')
         self._people = topic(PoseArray, 'people')
+        camera = scenario.camera
+        if camera is not None:
+            self._lens = Lens(
+                camera.width, camera.height, camera.focal, camera.middle, camera.distortion
+            )
+            self._images = topic(Image, 'camera/image_raw')
+            self._infos = topic(CameraInfo, 'camera/camera_info')
+
+    def publish_clock(self, now_ns: int) -> None:
+        """Publish the simulated time."""
+        message = Clock()
+        fill_stamp(message.clock, now_ns)
+        self._clock(message)
+
+    def publish_people(self, now_ns: int, people: Iterable[PersonState]) -> None:
+        """Publish where everybody is."""
+        self._people(people_to_message(now_ns, people, self._config.map_frame))
+
+    def publish_picture(self, picture: ImageSample) -> None:
+        """Publish a picture of the room's camera."""
+        frame = self._config.camera_frame
+        self._infos(lens_to_message(self._lens, picture.stamp, frame))
+        self._images(image_to_message(picture, frame))
+
+
+class RobotOutlets:
+    """Publishers of one robot.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    config : BridgeConfig
+    scenario : Scenario
+        As this robot has it. Its ultrasonic sensors have a topic each, ``ultrasonic/NAME``; what
+        its tag ranges is on ``uwb/exchanges``, what people's tags range on ``person/exchanges``.
+    prefix : str
+        Before each topic: the robot's namespace with a slash; '' for the only robot.
+    """
+
+    def __init__(
+        self, node: Node, config: BridgeConfig, scenario: Scenario, prefix: str = ''
+    ) -> None:
+        self._config = config
+        self._tag_id = scenario.tag_id
+        topic = _topics(node, prefix)
         self._exchanges = topic(UwbExchange, 'uwb/exchanges')
         if scenario.robot.anchors:
             self._worn = topic(UwbExchange, 'person/exchanges')
@@ -80,27 +119,8 @@ class Outlets:
             Truth: lambda s: truth(truth_to_message(s, *frames)),
             Contact: lambda s: contacts(contact_to_message(s)),
         }
-        camera = scenario.camera
-        if camera is not None:
-            lens = Lens(
-                camera.width, camera.height, camera.focal, camera.middle, camera.distortion
-            )
-            images = topic(Image, 'camera/image_raw')
-            infos = topic(CameraInfo, 'camera/camera_info')
 
-            def publish_picture(sample: ImageSample) -> None:
-                infos(lens_to_message(lens, sample.stamp, config.camera_frame))
-                images(image_to_message(sample, config.camera_frame))
-
-            self._by_type[ImageSample] = publish_picture
-
-    def publish_clock(self, now_ns: int) -> None:
-        """Publish the simulated time."""
-        message = Clock()
-        fill_stamp(message.clock, now_ns)
-        self._clock(message)
-
-    def publish_samples(self, samples: Iterable[Sample]) -> None:
+    def publish_samples(self, samples: Sequence[Sample]) -> None:
         """Publish each sample that has a topic."""
         for sample in samples:
             publish = self._by_type.get(type(sample))
@@ -113,6 +133,14 @@ class Outlets:
         else:
             self._worn(exchange_to_message(sample, sample.tag_id))
 
-    def publish_people(self, now_ns: int, people: Iterable[PersonState]) -> None:
-        """Publish where everybody is."""
-        self._people(people_to_message(now_ns, people, self._config.map_frame))
+
+def _topics(node: Node, prefix: str) -> Callable[[type[Any], str], Callable[[Any], None]]:
+    """Return a maker of publishers of the contract's topics, by their relative names."""
+
+    def topic(type_: type[Any], name: str) -> Callable[[Any], None]:
+        publish: Callable[[Any], None] = node.create_publisher(
+            type_, f'{prefix}{name}', qos_for(name)
+        ).publish
+        return publish
+
+    return topic

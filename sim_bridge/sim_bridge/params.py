@@ -26,6 +26,15 @@ class BridgeConfig(Config):
         description='x, y, heading of the robot in map at the start; the scenario says when empty',
         unit='m, m, rad',
     )
+    robots: int = parameter(
+        0,
+        description=(
+            "how many of the scenario's robots take part, each in its namespace; "
+            '0: the one at the start, without one'
+        ),
+        low=0,
+        high=10,
+    )
     map_frame: str = parameter('map', description='frame of ground truth and people')
     base_frame: str = parameter('base_link', description='frame of the robot')
     imu_frame: str = parameter('imu_link', description='frame of IMU and magnetometer')
@@ -40,9 +49,13 @@ class BridgeConfig(Config):
     )
 
     def check(self) -> None:
-        """Refuse a start that is no pose."""
+        """Refuse a start that is no pose, and one for several robots."""
         if len(self.start) not in (0, 3):
             raise ConfigError('start', list(self.start), 'no value, or x, y and heading')
+        if self.start and self.robots:
+            raise ConfigError(
+                'start', list(self.start), "no value: each of robots has the scenario's"
+            )
 
     @property
     def start_pose(self) -> Pose2 | None:

@@ -18,7 +18,9 @@ from sensor_msgs.msg import CameraInfo, Image, Imu, JointState, MagneticField, R
 from tf2_msgs.msg import TFMessage
 
 from sim_bridge.node import SimBridge
+from tablerunner.errors import ConfigError
 from tablerunner_interfaces.msg import UwbExchange
+from tablerunner_ros.qos import qos_for
 from tablerunner_ros.testing.probe import Probe
 from tablerunner_ros.testing.process import Process, Processes
 
@@ -122,7 +124,7 @@ def test_node_tells_the_time_before_what_was_measured_then(
         def publish_clock(self, now_ns: int) -> None:
             sent.append(now_ns)
 
-        def publish_samples(self, samples: tuple[Any, ...]) -> None:
+        def publish_samples(self, samples: list[Any]) -> None:
             assert samples
             assert all(sent[-1] - 20_000_000 < sample.stamp <= sent[-1] for sample in samples)
 
@@ -130,7 +132,8 @@ def test_node_tells_the_time_before_what_was_measured_then(
             assert sent[-1] == now_ns
             assert len(people) == 1
 
-    monkeypatch.setattr('sim_bridge.node.Outlets', Recorder)
+    monkeypatch.setattr('sim_bridge.node.RoomOutlets', Recorder)
+    monkeypatch.setattr('sim_bridge.robot_link.RobotOutlets', Recorder)
     node = probe.host(SimBridge, parameter_overrides=[Parameter('scenario', value=str(room))])
     for _ in range(100):
         node._tick()
@@ -295,3 +298,62 @@ def test_bridge_camera_pictures_come_with_their_lens(probe: Probe, tmp_path: Pat
         assert (image.width, image.height, len(image.data)) == (64, 48, 64 * 48 * 3)
         assert (info.width, info.height, info.k[0]) == (64, 48, 40.0)
         assert image.header.frame_id == 'ceiling_camera'
+
+
+SEVERAL = (
+    ROOM[: ROOM.index('people:')]
+    + """\
+robots:
+  - {name: one, start: [3.0, 5.0, 0.0]}
+  - {name: two, start: [7.0, 5.0, 0.0]}
+sensors:
+  uwb: {loss_probability: 0.0}
+"""
+)
+
+
+def test_bridge_several_robots_have_their_topics_in_their_namespaces(
+    probe: Probe, tmp_path: Path
+) -> None:
+    """A command to one moves only that one; ranges, wheels and frames are each one's own."""
+    path = tmp_path / 'room.yaml'
+    path.write_text(SEVERAL, encoding='utf-8')
+    heard: dict[str, dict[str, list[Any]]] = {}
+    wanted = {'ground_truth': Odometry, 'uwb/exchanges': UwbExchange, 'tf_static': TFMessage}
+    for name in ('one', 'two'):
+        heard[name] = {}
+        for topic, type_ in wanted.items():
+            messages = heard[name][topic] = []
+            profile = qos_for(topic, subscriber=True)
+            probe.node.create_subscription(type_, f'{name}/{topic}', messages.append, profile)
+    drive = probe.node.create_publisher(Twist, 'two/cmd_vel', qos_for('cmd_vel'))
+    overrides = {'scenario': str(path), 'robots': 2, 'real_time_factor': 4.0}
+    probe.host(
+        SimBridge,
+        parameter_overrides=[Parameter(name, value=value) for name, value in overrides.items()],
+    )
+    command = Twist()
+    command.linear.x = 0.5
+
+    def moved() -> bool:
+        drive.publish(command)
+        truth = heard['two']['ground_truth']
+        return bool(truth) and truth[-1].pose.pose.position.x > 7.3
+
+    probe.wait_for(moved, 'robot two to drive')
+    assert {m.pose.pose.position.x for m in heard['one']['ground_truth']} == {3.0}
+    stamps = {}
+    for name in ('one', 'two'):
+        exchanges = heard[name]['uwb/exchanges']
+        assert {message.tag_id for message in exchanges} == {name}
+        stamps[name] = {seconds(message.header.stamp) for message in exchanges}
+        (frames,) = heard[name]['tf_static']
+        assert {item.header.frame_id for item in frames.transforms} == {'base_link'}
+    assert not stamps['one'] & stamps['two']
+    probe.wait_diagnostic('sim_bridge', 'one: command stale', 'true')
+
+
+def test_bridge_robots_that_are_not_there_are_named(probe: Probe, room: Path) -> None:
+    overrides = [Parameter('scenario', value=str(room)), Parameter('robots', value=2)]
+    with pytest.raises(ConfigError, match='robots: got 2, expected at most 0'):
+        probe.host(SimBridge, parameter_overrides=overrides)

@@ -19,6 +19,8 @@ def test_params_start_is_a_pose_or_left_to_the_scenario() -> None:
     assert BridgeConfig(scenario='x', start=(1.0, 2.0, 3.0)).start_pose == Pose2(1.0, 2.0, 3.0)
     with pytest.raises(ConfigError, match='start: got'):
         BridgeConfig(scenario='x', start=(1.0,))
+    with pytest.raises(ConfigError, match=r'start: got.*expected no value'):
+        BridgeConfig(scenario='x', start=(1.0, 2.0, 3.0), robots=2)
 
 
 def test_params_are_all_in_the_documentation_with_their_defaults() -> None:

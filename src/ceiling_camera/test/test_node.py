@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from array import array
 from typing import Any
 
 import numpy as np
@@ -161,6 +162,67 @@ def test_what_cannot_be_used_is_refused_and_counted(probe: Probe, view: CeilingV
     eye.stamp -= 10**12
     probe.publish(IMAGES, eye.picture())
     eye.refused(f'{POSES}/one', 'no marker seen')
+
+
+def test_doubtful_markers_of_one_robot_leave_the_other_alone(
+    probe: Probe, view: CeilingView
+) -> None:
+    """Two of one colour, and one that the border cuts: no pose, a reason, and robot two's pose."""
+    eye = Eye(probe, view, 'one', 'two', pose_topics=['a/camera/pose', 'b/camera/pose'])
+    found: dict[str, list[Any]] = {'a': [], 'b': []}
+    for name, messages in found.items():
+        probe.node.create_subscription(
+            PoseWithCovarianceStamped, f'{name}/camera/pose', messages.append, 10
+        )
+        probe.heard(f'{name}/camera/pose')
+    eye.show_lens()
+    markers = [marker for marker, _ in MARKERS.values()]
+    cut = view.rays.slopes[120, -1] * (CAMERA.position[2] - markers[0].height)
+    cut += CAMERA.position[:2]
+    cases = {
+        'two markers of one colour': [POSE_ONE, Pose2(0.4, 1.5, 1.0)],
+        'marker at the border of the picture': [Pose2(*(float(part) for part in cut), 0.0)],
+    }
+    for count, (reason, ones) in enumerate(cases.items(), start=1):
+        eye.stamp += 100_000_000
+        robots = [RobotView(pose, 0.25, markers[0]) for pose in ones]
+        robots.append(RobotView(POSE_TWO, 0.25, markers[1]))
+        picture = ImageSample(eye.stamp, view.draw(0.0, robots))
+        probe.publish(IMAGES, image_to_message(picture, 'ceiling_camera'))
+        eye.refused(f'{POSES}/one', reason)
+        probe.wait_for(lambda count=count: len(found['b']) == count, 'the pose of robot two')
+        assert not found['a']
+
+
+def test_white_and_torn_pictures_are_refused(probe: Probe, view: CeilingView) -> None:
+    eye = Eye(probe, view)
+    eye.show_lens()
+    white = image_to_message(
+        ImageSample(eye.stamp, np.full((240, 320, 3), 255, np.uint8)), 'ceiling_camera'
+    )
+    probe.publish(IMAGES, white)
+    eye.refused(IMAGES, 'picture is white')
+    torn = eye.picture(POSE_ONE)
+    torn.data[200 * torn.step :] = array('B', bytes(40 * torn.step))
+    probe.publish(IMAGES, torn)
+    eye.refused(IMAGES, 'picture is torn')
+
+
+def test_late_picture_keeps_the_stamp_of_its_exposure(probe: Probe, view: CeilingView) -> None:
+    """It comes 0.3 s after its exposure and is used, at its time; an earlier one is not."""
+    eye = Eye(probe, view)
+    poses = probe.listen(PoseWithCovarianceStamped, POSES)
+    probe.heard(POSES)
+    eye.show_lens()
+    eye.stamp = time.time_ns() - 400_000_000
+    probe.publish(IMAGES, eye.picture(POSE_ONE))
+    message = probe.wait_for(lambda: poses, 'a pose')[0]
+    assert stamp_from_message(message.header.stamp) == eye.stamp
+    assert time.time_ns() - eye.stamp > 300_000_000
+    eye.stamp -= 250_000_000
+    probe.publish(IMAGES, eye.picture(POSE_ONE))
+    eye.refused(IMAGES, 'stamp does not advance')
+    assert len(poses) == 1
 
 
 def test_parameters_that_cannot_be_are_named(probe: Probe, view: CeilingView) -> None:

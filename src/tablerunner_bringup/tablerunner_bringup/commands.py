@@ -12,7 +12,7 @@ from tablerunner_bringup.run_options import RunOptions
 
 _Scenario = Annotated[
     Optional[Path],
-    typer.Option('--scenario', help='Scenario file; the restaurant when not given.'),
+    typer.Option('--scenario', help='Scenario file; a restaurant when not given.'),
 ]
 _Seed = Annotated[int, typer.Option(min=0, help='Seed of everything that is drawn.')]
 _Factor = Annotated[
@@ -31,9 +31,19 @@ def launch(
     scenario: _Scenario = None,
     seed: _Seed = 1,
     namespace: Annotated[str, typer.Option(help='Namespace of all nodes.')] = '',
+    robots: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=10,
+            help="How many of the scenario's robots, each in its namespace; 0: one, without.",
+        ),
+    ] = 0,
     stops: Annotated[
         Optional[list[str]],
-        typer.Option('--deliver', help='Table to go to, then end; may be given often.'),
+        typer.Option(
+            '--deliver', help='Table to go to, then end; may be given often; robots take turns.'
+        ),
     ] = None,
     wait: Annotated[float, typer.Option(min=0.0, help='Seconds to stand at each table.')] = 3.0,
     return_home: Annotated[
@@ -61,14 +71,17 @@ def launch(
 ) -> None:
     """Start the whole robot, each node a process of its own, until Ctrl-C or the deliveries' end.
 
-    Example: tablerunner launch --deliver table_3 --deliver table_7 --record
+    Example: tablerunner launch --deliver table_3 --deliver table_7 --record, or with several
+    robots tablerunner launch --robots 3 --deliver table_1 --deliver table_2 --deliver table_4
     """
     from tablerunner_bringup.launching import LaunchOptions
     from tablerunner_bringup.launching import launch as run
     from tablerunner_bringup.session import SessionSettings
 
     options = LaunchOptions(
-        _run_options(scenario, seed, unknown_start, estimator, real_time_factor, namespace, sim),
+        _run_options(
+            scenario, seed, unknown_start, estimator, real_time_factor, namespace, sim, robots
+        ),
         SessionSettings(
             record=record_bag or bool(record_topics),
             record_topics=tuple(map(_absolute, record_topics or ())),
@@ -134,12 +147,14 @@ def _run_options(
     real_time_factor: float,
     namespace: str = '',
     simulated: bool = True,
+    robots: int = 0,
 ) -> RunOptions:
     return RunOptions(
         scenario='' if scenario is None else str(scenario),
         seed=seed,
         namespace=namespace.strip('/'),
         simulated=simulated,
+        robots=robots,
         unknown_start=unknown_start,
         real_time_factor=real_time_factor,
         estimator=estimator,

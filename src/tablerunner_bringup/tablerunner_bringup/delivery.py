@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -117,3 +118,10 @@ class Delivery:
             tuple(result.reached),
             tuple(zip(result.missed, result.reasons, strict=False)),
         )
+
+
+def activity(feedback: Any) -> str:
+    """Return what a robot on a delivery does, from its feedback."""
+    left = feedback.distance_left
+    way = f', {left:.1f} m to go' if math.isfinite(left) and left > 0.0 else ''
+    return f'{feedback.state} ({feedback.stop}{way})'

@@ -12,16 +12,17 @@ from typing import Any
 from tablerunner.config import Document, build
 from tablerunner.errors import ConfigError
 from tablerunner_bringup.launching import scenario_of
-from tablerunner_bringup.nodes import nodes_of
+from tablerunner_bringup.nodes import run_nodes
 from tablerunner_bringup.parameters import flat
 from tablerunner_bringup.run_options import RunOptions
 
 _DEFAULTS = RunOptions()
 
 ARGUMENTS: tuple[tuple[str, str, str], ...] = (
-    ('scenario', '', 'Scenario file; the restaurant when empty'),
+    ('scenario', '', 'Scenario file; the restaurant when empty, the brasserie for several robots'),
     ('seed', str(_DEFAULTS.seed), 'Seed of everything that is drawn'),
     ('namespace', '', 'Namespace of all nodes'),
+    ('robots', '0', "How many of the scenario's robots, each in its namespace; 0: one, without"),
     ('simulated', 'true', 'Whether sim_bridge takes the place of hardware'),
     ('unknown_start', 'false', 'Whether the robot is not told where it stands'),
     ('real_time_factor', str(_DEFAULTS.real_time_factor), 'Simulated seconds per second'),
@@ -56,15 +57,15 @@ def describe(values: Mapping[str, str]) -> tuple[DescribedNode, ...]:
     files = (values['params'],) if values['params'] else ()
     return tuple(
         DescribedNode(
-            spec.package,
-            spec.executable,
-            spec.name,
-            run.namespace,
-            flat(spec.parameters(scenario, run)),
+            node.spec.package,
+            node.spec.executable,
+            node.spec.name,
+            node.options.namespace,
+            flat(node.parameters),
             files,
-            spec.remap,
+            node.spec.remap,
         )
-        for spec in nodes_of(run, scenario)
+        for node in run_nodes(run, scenario)
     )
 
 
@@ -73,6 +74,7 @@ def _options(values: Mapping[str, str]) -> RunOptions:
         'scenario': values['scenario'],
         'seed': _number('seed', values, int),
         'namespace': values['namespace'].strip('/'),
+        'robots': _number('robots', values, int),
         'simulated': _truth('simulated', values),
         'unknown_start': _truth('unknown_start', values),
         'real_time_factor': _number('real_time_factor', values, float),

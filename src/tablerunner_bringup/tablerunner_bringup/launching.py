@@ -13,9 +13,10 @@ from tablerunner.cli.console import Progress
 from tablerunner.cli.exits import DONE, FAILED
 from tablerunner.scenario import Scenario, load_scenario
 from tablerunner_bringup.child import Ending
-from tablerunner_bringup.delivery import Delivery, Outcome
+from tablerunner_bringup.delivery import Delivery, Outcome, activity
 from tablerunner_bringup.executables import find_share
 from tablerunner_bringup.interrupts import Interrupts
+from tablerunner_bringup.monitor import Monitor
 from tablerunner_bringup.run_folder import RunFolder
 from tablerunner_bringup.run_options import RunOptions
 from tablerunner_bringup.session import (
@@ -25,6 +26,7 @@ from tablerunner_bringup.session import (
     Session,
     SessionSettings,
 )
+from tablerunner_bringup.team_service import TeamService
 
 _SERVER_LIMIT_S = 20.0
 _GIVE_UP_S = 5.0
@@ -66,6 +68,7 @@ def launch(options: LaunchOptions, progress: Progress) -> int:
         The environment is not complete.
     """
     run, scenario = scenario_of(options.run)
+    scenario.team(run.robots)
     for stop in options.deliver:
         scenario.stop_pose(stop)
     folder = (
@@ -97,8 +100,30 @@ def _drive(session: Session, options: LaunchOptions, progress: Progress) -> int:
         progress.say('everything is up; Ctrl-C ends it')
         session.wait(lambda: False, lambda: situation(session))
         return DONE
+    if options.run.robots:
+        return deliver_all(session, options, progress)
     outcome = deliver(session, options.deliver, options.wait_s, options.return_home, progress)
     return DONE if outcome is not None and outcome.success else FAILED
+
+
+def deliver_all(session: Session, options: LaunchOptions, progress: Progress) -> int:
+    """Share the stops out among the robots in turn, drive all at once, and return exit code."""
+    service = TeamService(session, options.deliver, options.wait_s, options.return_home, progress)
+    try:
+        begun = time.monotonic()
+        session.wait(
+            lambda: service.is_ready or time.monotonic() - begun > _SERVER_LIMIT_S,
+            lambda: 'waiting for the deliver actions',
+        )
+        if not service.is_ready:
+            progress.say('not every robot offers the deliver action', 'red')
+            return FAILED
+        service.send()
+        if not session.wait(service.is_done, lambda: situation(session)):
+            service.cancel()
+        return DONE if service.success else FAILED
+    finally:
+        service.close()
 
 
 def deliver(
@@ -184,40 +209,38 @@ class _Follower:
         feedback = self._delivery.feedback
         if feedback is None:
             return situation(self._session)
-        return f'{situation(self._session)}  {_activity(feedback)}'
+        return f'{situation(self._session)}  {activity(feedback)}'
 
     def _tell(self) -> None:
         feedback = self._delivery.feedback
         if feedback is not None and (feedback.state, feedback.stop) != self._said:
             self._said = (feedback.state, feedback.stop)
-            self._progress.say(f'{elapsed_s(self._session):6.1f} s  {_activity(feedback)}')
+            self._progress.say(f'{elapsed_s(self._session):6.1f} s  {activity(feedback)}')
         for touch in self._session.monitor.touches[self._touches :]:
             self._progress.say(f'{elapsed_s(self._session):6.1f} s  {touch.words}', 'red')
         self._touches = len(self._session.monitor.touches)
 
 
-def _activity(feedback: Any) -> str:
-    left = feedback.distance_left
-    way = f', {left:.1f} m to go' if math.isfinite(left) and left > 0.0 else ''
-    return f'{feedback.state} ({feedback.stop}{way})'
-
-
 def elapsed_s(session: Session) -> float:
     """Return measurement time since the session was up; real time before the robot is known."""
-    base = session.monitor.base
+    base = next(iter(session.robots.values())).base
     return session.seconds_since_up(None if base is None else base.stamp)
 
 
 def situation(session: Session) -> str:
-    """Return in one line where the robot is, how fast, and how far off it believes to be."""
-    monitor = session.monitor
+    """Return in one line where each robot is, how fast, and how far off it believes to be."""
+    return f'{elapsed_s(session):6.1f} s' + ''.join(
+        (f'  {name}' if name else '') + _place(monitor) for name, monitor in session.robots.items()
+    )
+
+
+def _place(monitor: Monitor) -> str:
     estimate, base = monitor.estimate, monitor.base
-    text = f'{elapsed_s(session):6.1f} s'
     if estimate is None:
-        text += '  where the robot is is not known yet'
+        text = '  where the robot is is not known yet'
     else:
         pose = estimate.pose
-        text += f'  at {pose.x:5.2f} {pose.y:5.2f} m {math.degrees(pose.heading):4.0f} deg'
+        text = f'  at {pose.x:5.2f} {pose.y:5.2f} m {math.degrees(pose.heading):4.0f} deg'
     if base is not None:
         text += f'  {base.linear_m_s:4.2f} m/s'
     if not math.isnan(monitor.error_m):
@@ -233,7 +256,11 @@ def tell_ending(ending: Ending, progress: Progress) -> None:
 
 
 def scenario_of(run: RunOptions, default: str = 'restaurant') -> tuple[RunOptions, Scenario]:
-    """Return options with the scenario's path filled in, and the scenario."""
+    """Return options with the scenario's path filled in, and the scenario.
+
+    Several robots have a scenario of their own where none is given.
+    """
     if not run.scenario:
+        default = 'brasserie' if run.robots else default
         run = run.replace(scenario=str(default_scenario(default)))
     return run, load_scenario(run.scenario_path)

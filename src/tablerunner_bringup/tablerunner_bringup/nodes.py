@@ -22,6 +22,36 @@ class NodeSpec:
     simulation_only: bool = False
     needed: Callable[[Scenario], bool] = lambda scenario: True
     remap: tuple[tuple[str, str], ...] = ()
+    shared: bool = False  # one for all robots of a run
+
+
+@dataclass(frozen=True)
+class RunNode:
+    """A node of a run: with several robots most nodes are there once for each.
+
+    Attributes
+    ----------
+    spec : NodeSpec
+    scenario : Scenario
+        As the node's robot has it.
+    options : RunOptions
+        With the namespace that the node runs in, and the robot that it is of.
+    """
+
+    spec: NodeSpec
+    scenario: Scenario
+    options: RunOptions
+
+    @property
+    def label(self) -> str:
+        """Its name among all nodes of the run: ``robot_2/fusion_node``; as a rule its name."""
+        robot = self.options.robot
+        return f'{robot}/{self.spec.name}' if robot else self.spec.name
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What it is told."""
+        return self.spec.parameters(self.scenario, self.options)
 
 
 NODES: tuple[NodeSpec, ...] = (
@@ -33,6 +63,7 @@ NODES: tuple[NodeSpec, ...] = (
         'ceiling_camera',
         parameters.ceiling_camera,
         needed=lambda scenario: scenario.camera is not None,
+        shared=True,
     ),
     NodeSpec('fusion_node', 'fusion_node', 'fusion_node', parameters.fusion_node),
     NodeSpec('safety_stop', 'nav_controller', 'safety_stop', parameters.safety_stop),
@@ -45,6 +76,7 @@ NODES: tuple[NodeSpec, ...] = (
         simulation_only=True,
         # In a namespace too: every node of ROS listens to the clock there and nowhere else.
         remap=(('clock', '/clock'),),
+        shared=True,
     ),
 )
 """All nodes; they may be started in any order, and side by side."""
@@ -72,3 +104,25 @@ def nodes_of(options: RunOptions, scenario: Scenario) -> tuple[NodeSpec, ...]:
         for spec in (*NODES, PERSON_DRIVER)
         if (options.simulated or not spec.simulation_only) and spec.needed(scenario)
     )
+
+
+def run_nodes(options: RunOptions, scenario: Scenario) -> tuple[RunNode, ...]:
+    """Return all nodes of a run, each with what it is told: `nodes_of` for each robot.
+
+    Raises
+    ------
+    ConfigError
+        The scenario has fewer robots than were asked for.
+    """
+    specs = nodes_of(options, scenario)
+    team = scenario.team(options.robots)
+    if not team:
+        return tuple(RunNode(spec, scenario, options) for spec in specs)
+    found = [RunNode(spec, scenario, options) for spec in specs if spec.shared]
+    for member in team:
+        own = options.replace(
+            namespace=f'{options.namespace}/{member.name}'.strip('/'), robot=member.name
+        )
+        seen = scenario.seen_by(member)
+        found += [RunNode(spec, seen, own) for spec in specs if not spec.shared]
+    return tuple(found)

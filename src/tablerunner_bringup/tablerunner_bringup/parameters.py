@@ -5,21 +5,23 @@ What a node's Config has a default for and the scenario says nothing of is left 
 
 from __future__ import annotations
 
-import colorsys
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from tablerunner.scenario import PersonTag, Scenario
+from tablerunner.scenario import PersonTag, Scenario, hue_of
 from tablerunner_bringup.run_options import RunOptions
 
 Parameters = dict[str, Any]
 
+_EPOCH_ROUNDS = 1.5
+"""Rounds of all anchors that a fix of the UWB alone may gather, as its default does at 10 Hz."""
+
 
 def uwb_driver(scenario: Scenario, options: RunOptions) -> Parameters:
-    """Return where the anchors hang."""
-    return {
+    """Return where the anchors hang and, where several tags take turns, how long a fix gathers."""
+    told: Parameters = {
         **_common(options),
         'anchor_ids': [anchor.id for anchor in scenario.anchors],
         'anchor_positions': [
@@ -27,6 +29,9 @@ def uwb_driver(scenario: Scenario, options: RunOptions) -> Parameters:
         ],
         'tag_height': float(scenario.robot.tag_position[2]),
     }
+    if options.robots > 1:
+        told['epoch'] = round(_EPOCH_ROUNDS * options.robots / scenario.sensors.uwb.rate, 3)
+    return told
 
 
 def person_driver(scenario: Scenario, options: RunOptions) -> Parameters:
@@ -61,7 +66,7 @@ def odom_node(scenario: Scenario, options: RunOptions) -> Parameters:
 
 
 def ceiling_camera(scenario: Scenario, options: RunOptions) -> Parameters:
-    """Return where the camera was measured to hang, and the marker that the robot wears."""
+    """Return where the camera was measured to hang, and the markers that the robots wear."""
     told: Parameters = _common(options)
     camera, marker = scenario.camera, scenario.robot.marker
     if camera is not None:
@@ -71,16 +76,20 @@ def ceiling_camera(scenario: Scenario, options: RunOptions) -> Parameters:
             'tilt': [float(number) for number in camera.tilt],
         }
     if marker is not None:
-        red, green, blue = (number / 255.0 for number in marker.colour)
+        team = scenario.team(options.robots)
+        names = [member.name for member in team] or ['robot']
+        colours = [member.colour or marker.colour for member in team] or [marker.colour]
         told['marker'] = {
-            'robots': ['robot'],
-            'hues': [round(360.0 * colorsys.rgb_to_hsv(red, green, blue)[0], 1)],
-            'heights': [float(marker.height)],
+            'robots': names,
+            'hues': [round(hue_of(colour), 1) for colour in colours],
+            'heights': [float(marker.height)] * len(names),
             'disc_x': float(marker.disc_x),
             'disc_radius': float(marker.disc_radius),
             'front_x': float(marker.front_x),
             'front_radius': float(marker.front_radius),
         }
+        if team:
+            told['pose_topics'] = [f'{name}/camera/pose' for name in names]
     return told
 
 
@@ -100,6 +109,8 @@ def fusion_node(scenario: Scenario, options: RunOptions) -> Parameters:
 def nav_controller(scenario: Scenario, options: RunOptions) -> Parameters:
     """Return the map, which the node reads from the scenario itself, and whom it may follow."""
     parameters: Parameters = {**_common(options), 'scenario': _path(options)}
+    if options.robot:
+        parameters['robot'] = options.robot
     tag = worn_tag(scenario)
     if tag is not None:
         parameters['person'] = {'tag_id': tag.id, 'tag_height': float(tag.position[2])}
@@ -117,6 +128,7 @@ def sim_bridge(_scenario: Scenario, options: RunOptions) -> Parameters:
         'scenario': _path(options),
         'seed': int(options.seed),
         'real_time_factor': float(options.real_time_factor),
+        'robots': int(options.robots),
     }
 
 

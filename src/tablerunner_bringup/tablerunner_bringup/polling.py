@@ -55,8 +55,8 @@ class Newest:
 
 
 @contextlib.contextmanager
-def bare_node(name: str, domain: int | None = None, namespace: str = '') -> Iterator[Node]:
-    """Make a node without services of its own, in a context whose signals are left to us."""
+def bare_context(domain: int | None = None) -> Iterator[Context]:
+    """Make a context whose signals are left to us: one participant of DDS."""
     context = Context()
     rclpy.init(
         args=[],
@@ -65,9 +65,32 @@ def bare_node(name: str, domain: int | None = None, namespace: str = '') -> Iter
         signal_handler_options=SignalHandlerOptions.NO,
     )
     try:
+        yield context
+    finally:
+        rclpy.try_shutdown(context=context)
+
+
+@contextlib.contextmanager
+def bare_node(
+    name: str, domain: int | None = None, namespace: str = '', context: Context | None = None
+) -> Iterator[Node]:
+    """Make a node without services of its own.
+
+    Parameters
+    ----------
+    name : str
+    domain : int, optional
+        Of the context that it gets for itself.
+    namespace : str
+    context : Context, optional
+        To share with other nodes of this process. Several should: between participants of one
+        process Fast DDS 2 calls across under the locks of both, and can lock up when they end.
+    """
+    with contextlib.ExitStack() as stack:
+        own = stack.enter_context(bare_context(domain)) if context is None else context
         node = Node(
             name,
-            context=context,
+            context=own,
             namespace=namespace or None,
             start_parameter_services=False,
             enable_rosout=False,
@@ -77,5 +100,3 @@ def bare_node(name: str, domain: int | None = None, namespace: str = '') -> Iter
             yield node
         finally:
             node.destroy_node()
-    finally:
-        rclpy.try_shutdown(context=context)

@@ -103,7 +103,16 @@ class RunFolder:
 
     def log(self, name: str) -> Path:
         """Return the log of a process."""
-        return self.logs / f'{name}.log'
+        return self.logs / f'{_flat(name)}.log'
+
+    def parameter_file(self, name: str) -> Path:
+        """Return the ROS parameter file of a node."""
+        return self.parameters / f'{_flat(name)}.yaml'
+
+
+def _flat(name: str) -> str:
+    """Return the name of a file for a node of one of several robots."""
+    return name.replace('/', '.')
 
 
 def _unusable(path: Path, error: OSError) -> ConfigError:

@@ -12,9 +12,20 @@ from tablerunner.config import Config, parameter
 class RunOptions(Config):
     """Options that become parameters of nodes; the launcher and the launch file share them."""
 
-    scenario: str = parameter('', description='Scenario file; empty: the restaurant')
+    scenario: str = parameter(
+        '', description='Scenario file; empty: the restaurant, or the brasserie for several robots'
+    )
     seed: int = parameter(1, description='Seed of everything that is drawn', low=0, high=2**31 - 1)
     namespace: str = parameter('', description='Namespace of all nodes of this robot')
+    robots: int = parameter(
+        0,
+        description="How many of the scenario's robots; 0: the one at the start, no namespace",
+        low=0,
+        high=10,
+    )
+    robot: str = parameter(
+        '', description='Which of several robots a node is of; launchers set it'
+    )
     simulated: bool = parameter(True, description='Whether sim_bridge takes the place of hardware')
     unknown_start: bool = parameter(
         False, description='Whether the robot is not told where it stands at the start'

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
+from rclpy.context import Context
 from rclpy.node import Node
 
 from tablerunner.cli.console import Progress
@@ -24,8 +25,8 @@ from tablerunner_bringup.executables import find_executable
 from tablerunner_bringup.interrupts import Interrupts
 from tablerunner_bringup.large_messages import allow_large_messages
 from tablerunner_bringup.monitor import Monitor
-from tablerunner_bringup.nodes import COMMANDING, NodeSpec, nodes_of
-from tablerunner_bringup.polling import bare_node
+from tablerunner_bringup.nodes import COMMANDING, RunNode, run_nodes
+from tablerunner_bringup.polling import bare_context, bare_node
 from tablerunner_bringup.run_folder import RunFolder
 from tablerunner_bringup.run_options import RunOptions
 from tablerunner_bringup.supervisor import StopLimits, Supervisor
@@ -75,6 +76,14 @@ class Session:
         A node ended by itself, at the start or later (from `tick`).
     NotUpError, InterruptedRunError
         While starting.
+
+    Attributes
+    ----------
+    folder : RunFolder
+    monitor : Monitor
+        Of the run's namespace: the only robot, or what several share.
+    robots : dict of str to Monitor
+        Of each robot by its name; '' for the only one.
     """
 
     def __init__(
@@ -88,15 +97,17 @@ class Session:
     ) -> None:
         self.folder = folder
         self.monitor: Monitor
+        self.robots: dict[str, Monitor] = {}
         self._scenario = scenario
         self._options = options
         self._settings = settings or SessionSettings()
         self._progress = progress
         self._interrupts = interrupts
         self._supervisor = Supervisor(_LIMITS)
-        self._specs = nodes_of(options, scenario)
+        self._nodes = run_nodes(options, scenario)
         self._stack = contextlib.ExitStack()
         self._domain: int | None = None
+        self._context: Context | None = None
         self._up_at = time.monotonic()
         self._up_stamp: int | None = None
 
@@ -112,7 +123,8 @@ class Session:
 
     def _start(self) -> None:
         programs = {
-            spec.name: find_executable(spec.package, spec.executable) for spec in self._specs
+            node.label: find_executable(node.spec.package, node.spec.executable)
+            for node in self._nodes
         }
         if self._options.simulated:
             # For this process too: its own nodes must hear no more and no less than the others.
@@ -120,15 +132,21 @@ class Session:
         if self._scenario.camera is not None:
             allow_large_messages(os.environ)
         self._domain = self._choose_domain()
+        self._context = self._stack.enter_context(bare_context(self._domain))
         self._progress.say(f'run in {self.folder.path}, ROS domain {self._domain_words}')
         self.monitor = Monitor(self.node('tablerunner_launcher'))
+        for robot in dict.fromkeys(node.options.robot for node in self._nodes):
+            if robot:
+                self.robots[robot] = Monitor(self.node('tablerunner_launcher', robot))
+        if not self.robots:
+            self.robots[''] = self.monitor
         if self._settings.record:
             self._supervisor.start(self._recorder_command())
-        for spec in self._specs:
-            self._supervisor.start(self._command(spec, programs[spec.name]))
+        for node in self._nodes:
+            self._supervisor.start(self._command(node, programs[node.label]))
         self._wait_until_up()
         self._up_at = time.monotonic()
-        base = self.monitor.base
+        base = next(iter(self.robots.values())).base
         self._up_stamp = None if base is None else base.stamp
 
     def seconds_since_up(self, stamp: int | None) -> float:
@@ -140,9 +158,15 @@ class Session:
             return time.monotonic() - self._up_at
         return (stamp - self._up_stamp) / NANOSECONDS
 
-    def node(self, name: str) -> Node:
-        """Return a new node in the domain and namespace of the run; it ends with the run."""
-        return self._stack.enter_context(bare_node(name, self._domain, self._options.namespace))
+    def node(self, name: str, robot: str = '') -> Node:
+        """Return a new node in the run's domain, and its or a robot's namespace.
+
+        It ends with the run.
+        """
+        namespace = f'{self._options.namespace}/{robot}'.strip('/')
+        return self._stack.enter_context(
+            bare_node(name, namespace=namespace, context=self._context)
+        )
 
     @property
     def _domain_words(self) -> str:
@@ -165,18 +189,19 @@ class Session:
         environment.setdefault('OMP_NUM_THREADS', '1')
         return environment
 
-    def _command(self, spec: NodeSpec, program: Path) -> Command:
-        file = self.folder.parameters / f'{spec.name}.yaml'
-        parameters.write(file, spec.name, spec.parameters(self._scenario, self._options))
+    def _command(self, node: RunNode, program: Path) -> Command:
+        spec, namespace = node.spec, node.options.namespace
+        file = self.folder.parameter_file(node.label)
+        parameters.write(file, spec.name, node.parameters)
         arguments = [str(program), '--ros-args', '-r', f'__node:={spec.name}']
-        if self._options.namespace:
-            arguments += ['-r', f'__ns:=/{self._options.namespace.strip("/")}']
+        if namespace:
+            arguments += ['-r', f'__ns:=/{namespace.strip("/")}']
         for old, new in spec.remap:
             arguments += ['-r', f'{old}:={new}']
         for path in (file, *self._settings.parameter_files):
             arguments += ['--params-file', str(path.resolve())]
         return Command(
-            spec.name, tuple(arguments), self.folder.log(spec.name), self._environment()
+            node.label, tuple(arguments), self.folder.log(node.label), self._environment()
         )
 
     def _recorder_command(self) -> Command:
@@ -196,20 +221,22 @@ class Session:
         )
 
     def _wait_until_up(self) -> None:
-        waiting = {spec.name for spec in self._specs}
-        deadline = time.monotonic() + self._settings.up_limit_s
+        waiting = {node.label: node for node in self._nodes}
+        # Each robot has as many nodes as a whole run without the others.
+        limit_s = self._settings.up_limit_s * max(self._options.robots, 1)
+        deadline = time.monotonic() + limit_s
         while waiting:
             self.tick()
             self._raise_when_interrupted()
-            for name in [name for name in waiting if self.monitor.is_up(name)]:
-                waiting.discard(name)
-                self._progress.say(f'  {name} is up')
+            for label, node in list(waiting.items()):
+                if self.robots.get(node.options.robot, self.monitor).is_up(node.spec.name):
+                    del waiting[label]
+                    self._progress.say(f'  {label} is up')
             self._progress.show('waiting for ' + ', '.join(sorted(waiting)))
             if waiting and time.monotonic() > deadline:
-                logs = ', '.join(str(self.folder.log(name)) for name in sorted(waiting))
+                logs = ', '.join(str(self.folder.log(label)) for label in sorted(waiting))
                 raise NotUpError(
-                    f'{", ".join(sorted(waiting))} not up after {self._settings.up_limit_s:g} s; '
-                    f'see {logs}'
+                    f'{", ".join(sorted(waiting))} not up after {limit_s:g} s; see {logs}'
                 )
             time.sleep(_TICK_S)
 
@@ -227,11 +254,17 @@ class Session:
         NodeEndedError
             After the robot has been brought to a stand.
         """
-        self.monitor.poll()
+        self._poll()
         endings = self._supervisor.ended()
         if endings:
             self._stand_still()
             raise NodeEndedError(endings[0])
+
+    def _poll(self) -> None:
+        self.monitor.poll()
+        for monitor in self.robots.values():
+            if monitor is not self.monitor:
+                monitor.poll()
 
     def wait(self, done: Callable[[], bool], show: Callable[[], str]) -> bool:
         """Tick until `done` (True) or until the run is asked to end (False)."""
@@ -246,22 +279,24 @@ class Session:
     # -- end ----------------------------------------------------------------------------------
 
     def _stand_still(self) -> None:
-        """Take the command away and wait until the robot stands, for a bounded time.
+        """Take the commands away and wait until every robot stands, for a bounded time.
 
         The safety stop is told to brake, which is quickest; should it not hear that, it goes to
         zero without commands, and without the safety stop the base does. Those two therefore
-        keep running until the robot stands.
+        keep running until the robots stand.
         """
         deadline = time.monotonic() + _STAND_LIMIT_S
-        self.monitor.stop_robot()
-        if COMMANDING in self._supervisor.running:
-            self._supervisor.interrupt(COMMANDING)
+        for monitor in self.robots.values():
+            monitor.stop_robot()
+        for node in self._nodes:
+            if node.spec.name == COMMANDING and node.label in self._supervisor.running:
+                self._supervisor.interrupt(node.label)
         if 'sim_bridge' not in self._supervisor.running and self._options.simulated:
             return  # no base left that could move
         while time.monotonic() < deadline:
-            self.monitor.poll()
-            base = self.monitor.base
-            if base is None or base.stands:
+            self._poll()
+            bases = [monitor.base for monitor in self.robots.values()]
+            if all(base is None or base.stands for base in bases):
                 return
             time.sleep(_TICK_S)
 

@@ -18,6 +18,7 @@ from tablerunner_bringup.nodes import NODES, nodes_of
 
 FILE = Path(__file__).parents[1] / 'launch' / 'delivery.launch.py'
 RESTAURANT = Path(__file__).parents[1] / 'scenarios' / 'restaurant.yaml'
+BRASSERIE = RESTAURANT.with_name('brasserie.yaml')
 DEFAULTS = {name: default for name, default, _ in ARGUMENTS} | {'scenario': str(RESTAURANT)}
 
 
@@ -74,6 +75,16 @@ def test_launch_file_makes_the_nodes_of_the_list(description):
     assert by_name['sim_bridge']['remappings'] == [('clock', '/clock')]
 
 
+def test_launch_file_makes_a_stack_for_each_robot(description):
+    """With robots:=3 they are in a namespace each, and camera and bridge are shared."""
+    function = description.arguments[0][-1].named['function']
+    made = function({**DEFAULTS, 'robots': '3', 'scenario': str(BRASSERIE)})
+    spaces = [(item.named['namespace'], item.named['name']) for item in made]
+    assert len(spaces) == len(set(spaces)) == 2 + 3 * 5
+    assert ('robot_2', 'fusion_node') in spaces
+    assert ('', 'ceiling_camera') in spaces
+
+
 def test_describe_parameters_equal_those_of_the_launcher(tmp_path):
     """What a launch file passes on and what the launcher writes to a file is the same."""
     from tablerunner_bringup.description import _options
@@ -92,6 +103,8 @@ def test_describe_parameters_equal_those_of_the_launcher(tmp_path):
     [
         ('seed', 'many'),
         ('seed', '-1'),
+        ('robots', '2'),  # the restaurant has none
+        ('robots', 'many'),
         ('simulated', 'maybe'),
         ('real_time_factor', '0'),
         ('scenario', '/nowhere.yaml'),

@@ -8,18 +8,21 @@ import pytest
 import yaml
 
 from tablerunner.config import Document, build
+from tablerunner.errors import ConfigError
 from tablerunner.estimation import LocalizerConfig
 from tablerunner.odometry import OdometerConfig
 from tablerunner.scenario import Scenario, load_scenario
 from tablerunner.uwb import PositionerConfig, RangerConfig
+from tablerunner.vision import LocatorConfig
 from tablerunner_bringup import parameters
-from tablerunner_bringup.nodes import COMMANDING, NODES, nodes_of
+from tablerunner_bringup.nodes import COMMANDING, NODES, nodes_of, run_nodes
 from tablerunner_bringup.parameter_files import CONFIGS
 from tablerunner_bringup.parameters import flat
 from tablerunner_bringup.run_options import RunOptions
 from tablerunner_ros.parameters import fields_of
 
 RESTAURANT = Path(__file__).parents[1] / 'scenarios' / 'restaurant.yaml'
+BRASSERIE = RESTAURANT.with_name('brasserie.yaml')
 ODD = """\
 name: odd
 start: [1, 2, 3]
@@ -134,3 +137,71 @@ def test_parameters_empty_list_is_left_out(tmp_path):
     parameters.write(file, 'node', {'anchors': [], 'wheels': {'names': [], 'radius': 0.1}})
     told = yaml.safe_load(file.read_text(encoding='utf-8'))
     assert told == {'/**/node': {'ros__parameters': {'wheels.radius': 0.1}}}
+
+
+def test_parameters_of_several_robots(tmp_path):
+    """Each stack is told of its own start; the camera of all colours; the bridge how many."""
+    scenario, options = load_scenario(BRASSERIE), RunOptions(scenario=str(BRASSERIE), robots=2)
+    found = {node.label: node for node in run_nodes(options, scenario)}
+    own = {'uwb_driver', 'odom_node', 'fusion_node', 'safety_stop', 'nav_controller'}
+    assert set(found) == {'ceiling_camera', 'sim_bridge'} | {
+        f'robot_{number}/{name}' for number in (1, 2) for name in own
+    }
+    for number, start in ((1, [1.0, 4.5, 0.0]), (2, [1.0, 3.3, 0.0])):
+        fusion = found[f'robot_{number}/fusion_node']
+        assert fusion.options.namespace == f'robot_{number}'
+        assert fusion.parameters['initial_pose'] == start
+        assert found[f'robot_{number}/nav_controller'].parameters['robot'] == f'robot_{number}'
+    # Two tags share 10 rounds of the anchors a second: one round takes each 0.2 s.
+    driver = found['robot_1/uwb_driver'].parameters
+    assert driver['epoch'] == 0.3
+    build(PositionerConfig, Document({'epoch': driver['epoch']}))
+    camera = found['ceiling_camera']
+    assert camera.options.namespace == ''
+    assert camera.parameters['pose_topics'] == ['robot_1/camera/pose', 'robot_2/camera/pose']
+    told = camera.parameters['marker']
+    assert told['robots'] == ['robot_1', 'robot_2']
+    # (235, 40, 140) and (30, 190, 60) by hand: 60 (6 - 100/195) and 60 (2 + 30/160).
+    assert told['hues'] == [329.2, 131.2]
+    assert told['heights'] == [1.15, 1.15]
+    given = {
+        name: value for name, value in camera.parameters.items() if name in {'mount', 'marker'}
+    }
+    build(LocatorConfig, Document(given))
+    assert found['sim_bridge'].parameters['robots'] == 2
+    for node in found.values():
+        known = {f.name for cls in CONFIGS[node.spec.name] for f in fields_of(cls)}
+        assert set(flat(node.parameters)) - {'use_sim_time'} <= known
+
+
+def test_parameters_of_one_named_robot_keep_its_topic():
+    """With --robots 1 the camera's pose is in the robot's namespace all the same."""
+    scenario, options = load_scenario(BRASSERIE), RunOptions(scenario=str(BRASSERIE), robots=1)
+    camera = next(n for n in run_nodes(options, scenario) if n.label == 'ceiling_camera')
+    assert camera.parameters['pose_topics'] == ['robot_1/camera/pose']
+
+
+def test_parameters_robots_stand_in_the_namespace_of_the_run():
+    scenario = load_scenario(BRASSERIE)
+    options = RunOptions(scenario=str(BRASSERIE), robots=3, namespace='hall')
+    spaces = {node.label: node.options.namespace for node in run_nodes(options, scenario)}
+    assert spaces['robot_3/odom_node'] == 'hall/robot_3'
+    assert spaces['sim_bridge'] == spaces['ceiling_camera'] == 'hall'
+
+
+def test_parameters_more_robots_than_there_are_is_refused():
+    scenario = load_scenario(BRASSERIE)
+    with pytest.raises(ConfigError, match='robots: got 4, expected at most 3'):
+        run_nodes(RunOptions(scenario=str(BRASSERIE), robots=4), scenario)
+
+
+def test_parameters_without_robots_are_those_of_one(odd):
+    scenario, options = odd
+    assert [node.label for node in run_nodes(options, scenario)] == [
+        spec.name for spec in nodes_of(options, scenario)
+    ]
+    bistro = load_scenario(RESTAURANT.with_name('bistro.yaml'))
+    told = parameters.ceiling_camera(bistro, options)
+    assert told['marker']['robots'] == ['robot']
+    assert 'pose_topics' not in told
+    assert 'epoch' not in parameters.uwb_driver(bistro, options)

@@ -51,10 +51,19 @@ class TransformBroadcaster:
 
 
 class StaticTransformBroadcaster:
-    """Publishes transforms that never change, latched, all in one message."""
+    """Publishes transforms that never change, latched, all in one message.
 
-    def __init__(self, node: Node) -> None:
-        self._publisher = node.create_publisher(TFMessage, 'tf_static', qos_for('tf_static'))
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    prefix : str
+        Put before the topic's name: a namespace below the node's own, with a slash at its end.
+    """
+
+    def __init__(self, node: Node, prefix: str = '') -> None:
+        self._publisher = node.create_publisher(
+            TFMessage, f'{prefix}tf_static', qos_for('tf_static')
+        )
         self._transforms: dict[str, TransformStamped] = {}
 
     def send(self, *transforms: TransformStamped) -> None:

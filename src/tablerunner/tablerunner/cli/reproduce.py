@@ -20,7 +20,9 @@ def reproduce(
     seeds: Annotated[
         Optional[int],
         typer.Option(
-            metavar='N', min=1, help='How many seeds to run; 20, of pf_uiekf and camera_start 100.'
+            metavar='N',
+            min=1,
+            help='How many seeds to run; 20, of pf_uiekf and camera_start 100, of crossings 4.',
         ),
     ] = None,
     first_seed: Annotated[
@@ -56,7 +58,7 @@ def reproduce(
     from tablerunner.evaluation.plots.sheet import write_sheet
     from tablerunner.experiments.registry import (
         EXPERIMENTS,
-        MORE_SEEDS,
+        OTHER_SEEDS,
         RECORDED,
         USUAL_SEEDS,
         require_experiment,
@@ -71,7 +73,7 @@ def reproduce(
         if name in RECORDED:
             outcome = RECORDED[name](data, bar.show)
         else:
-            count = seeds or MORE_SEEDS.get(name, USUAL_SEEDS)
+            count = seeds or OTHER_SEEDS.get(name, USUAL_SEEDS)
             outcome = EXPERIMENTS[name](range(first_seed, first_seed + count), bar.show)
     console = Console(highlight=False, width=None if Console().is_terminal else 120)
     console.print(table_of(outcome))

@@ -14,7 +14,7 @@ from tablerunner.geometry.pose import Pose2
 from tablerunner.odometry import Odometer, OdometerConfig
 from tablerunner.scenario import Scenario
 from tablerunner.simulation import Simulator
-from tablerunner.simulation.simulator import Sample
+from tablerunner.simulation.sample import Sample
 from tablerunner.simulation.truth import Truth
 from tablerunner.types import (
     ExchangeSample,

@@ -8,6 +8,7 @@ from tablerunner.scenario.anchor import AnchorPlace
 from tablerunner.scenario.box import Box
 from tablerunner.scenario.camera import Camera, Light
 from tablerunner.scenario.kitchen import Kitchen
+from tablerunner.scenario.member import Member, hue_of
 from tablerunner.scenario.outline import Outline
 from tablerunner.scenario.person import Person, PersonTag
 from tablerunner.scenario.robot import (
@@ -40,6 +41,7 @@ __all__ = [
     'Light',
     'MagneticErrors',
     'Marker',
+    'Member',
     'Outline',
     'Person',
     'PersonTag',
@@ -52,5 +54,6 @@ __all__ = [
     'UwbErrors',
     'Wall',
     'WheelErrors',
+    'hue_of',
     'load_scenario',
 ]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.segments import crosses, distance_to_segments
+from tablerunner.scenario.member import hue_of
 from tablerunner.scenario.outline import Outline
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 _ROUTE_STEP_M = 0.05
 _ANCHOR_SPREAD_M = 0.05
+
+_HUES_APART_DEG = 36.0
+"""Two colours nearer than this are one to ceiling_camera, as it is set by default."""
 
 
 def check_scenario(scenario: Scenario) -> None:
@@ -33,6 +37,7 @@ def check_scenario(scenario: Scenario) -> None:
     _check_tags(scenario)
     _check_routes(scenario)
     _check_camera(scenario)
+    _check_robots(scenario)
 
 
 def _once(field: str, names: Iterable[str], key: str) -> None:
@@ -50,6 +55,7 @@ def _check_names(scenario: Scenario) -> None:
     _once('tables', (table.name for table in scenario.tables), 'name')
     _once('boxes', (box.name for box in scenario.boxes), 'name')
     _once('people', (person.name for person in scenario.people), 'name')
+    _once('robots', (member.name for member in scenario.robots), 'name')
     if scenario.kitchen is not None:
         for index, table in enumerate(scenario.tables):
             if table.name == scenario.kitchen.name:
@@ -121,6 +127,7 @@ def _check_stops(scenario: Scenario) -> None:
         places.append(('kitchen.stop', scenario.kitchen.stop))
     if scenario.start is not None:
         places.append(('start', scenario.start))
+    places += [(f'robots[{i}].start', member.start) for i, member in enumerate(scenario.robots)]
     for field, place in places:
         radius = scenario.robot.footprint_radius
         _check_clear(scenario, field, np.array([place[:2]]), radius, list(place))
@@ -148,6 +155,11 @@ def _check_tags(scenario: Scenario) -> None:
     """Refuse tags and anchors that answer to one name, and tags that no anchors can locate."""
     taken = {scenario.tag_id: 'tag_id'}
     taken.update({anchor.id: f'anchors[{i}].id' for i, anchor in enumerate(scenario.anchors)})
+    for index, member in enumerate(scenario.robots):
+        if member.tag in taken and taken[member.tag] != 'tag_id':
+            field = f'robots[{index}].tag_id'
+            raise ConfigError(field, member.tag, f'another name than {taken[member.tag]}')
+        taken[member.tag] = f'robots[{index}].tag_id'
     names = [(f'robot.anchors[{i}].id', item.id) for i, item in enumerate(scenario.robot.anchors)]
     names += [
         (f'people[{i}].tag.id', person.tag.id)
@@ -194,4 +206,31 @@ def _check_camera(scenario: Scenario) -> None:
         if height >= place[2]:
             raise ConfigError(
                 'camera.position[2]', place[2], f'a height above {name} ({height:g} m) [m]'
+            )
+
+
+def _check_robots(scenario: Scenario) -> None:
+    """Refuse robots on each other, of one colour, and several that carry anchors."""
+    if scenario.robots and scenario.robot.anchors:
+        ids = [item.id for item in scenario.robot.anchors]
+        raise ConfigError('robot.anchors', ids, 'none where there are several robots')
+    marker = scenario.robot.marker
+    apart = 2.0 * scenario.robot.footprint_radius
+    for (_, first), (index, second) in itertools.combinations(enumerate(scenario.robots), 2):
+        if first.start_pose.distance_to(second.start_pose) < apart:
+            raise ConfigError(
+                f'robots[{index}].start',
+                list(second.start),
+                f'a place at least {apart:g} m from that of {first.name}',
+            )
+        if marker is None:
+            continue
+        colours = [member.colour or marker.colour for member in (first, second)]
+        off = abs((hue_of(colours[0]) - hue_of(colours[1]) + 180.0) % 360.0 - 180.0)
+        if off < _HUES_APART_DEG:
+            raise ConfigError(
+                f'robots[{index}].colour',
+                list(colours[1]),
+                f'a hue at least {_HUES_APART_DEG:g} degrees from that of {first.name} '
+                f'({off:.0f} degrees off)',
             )

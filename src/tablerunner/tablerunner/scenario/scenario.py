@@ -17,6 +17,7 @@ from tablerunner.scenario.anchor import AnchorPlace
 from tablerunner.scenario.box import Box
 from tablerunner.scenario.camera import Camera
 from tablerunner.scenario.kitchen import Kitchen
+from tablerunner.scenario.member import Member
 from tablerunner.scenario.outline import Outline
 from tablerunner.scenario.person import Person
 from tablerunner.scenario.robot import RobotGeometry
@@ -55,6 +56,9 @@ class Scenario(Config):
         unit='m, m, rad',
     )
     robot: RobotGeometry = parameter(factory=RobotGeometry, description='body of the robot')
+    robots: tuple[Member, ...] = parameter(
+        (), description='several robots; a run takes the first few, or only the one at start'
+    )
     sensors: SensorErrors = parameter(
         factory=SensorErrors, description='rates and errors of the simulated sensors'
     )
@@ -65,6 +69,47 @@ class Scenario(Config):
         if self.start is not None:
             return Pose2(*self.start)
         return self.kitchen.stop_pose if self.kitchen is not None else Pose2()
+
+    def team(self, count: int) -> tuple[Member, ...]:
+        """Return the first few of the robots.
+
+        Raises
+        ------
+        ConfigError
+            There are not so many.
+        """
+        if not 0 <= count <= len(self.robots):
+            there = f'at most {len(self.robots)}, as {self.name} has under robots'
+            raise ConfigError('robots', count, there)
+        return self.robots[:count]
+
+    def member(self, name: str) -> Member:
+        """Return one of the robots.
+
+        Raises
+        ------
+        ConfigError
+            There is none of this name; the message lists those there are.
+        """
+        for member in self.robots:
+            if member.name == name:
+                return member
+        names = ', '.join(member.name for member in self.robots)
+        raise ConfigError('robot', name, f'one of {names}' if names else 'a scenario with robots')
+
+    def seen_by(self, member: Member) -> Scenario:
+        """Return the scenario of one of several robots: its start, its colour, its tag.
+
+        It is loaded where it starts, so that not all want to stand in one place.
+        """
+        robot, kitchen = self.robot, self.kitchen
+        if robot.marker is not None and member.colour is not None:
+            robot = robot.replace(marker=robot.marker.replace(colour=member.colour))
+        if kitchen is not None:
+            kitchen = kitchen.replace(stop=member.start)
+        return self.replace(
+            robot=robot, kitchen=kitchen, start=member.start, tag_id=member.tag, robots=()
+        )
 
     @property
     def stops(self) -> dict[str, Pose2]:

@@ -5,8 +5,11 @@ estimation or control: a mistake in those cannot hide behind the same mistake he
 are in docs/simulation.md.
 """
 
-from tablerunner.simulation.simulator import START_NS, STEP_NS, Sample, Simulator
-from tablerunner.simulation.truth import Contact, PersonState, RangeTruth, Truth
+from tablerunner.simulation.robot import SimulatedRobot
+from tablerunner.simulation.sample import Sample
+from tablerunner.simulation.simulator import Simulator
+from tablerunner.simulation.team import START_NS, STEP_NS, Team, TeamStep
+from tablerunner.simulation.truth import Contact, PersonState, RangeTruth, RobotState, Truth
 
 __all__ = [
     'START_NS',
@@ -14,7 +17,11 @@ __all__ = [
     'Contact',
     'PersonState',
     'RangeTruth',
+    'RobotState',
     'Sample',
+    'SimulatedRobot',
     'Simulator',
+    'Team',
+    'TeamStep',
     'Truth',
 ]

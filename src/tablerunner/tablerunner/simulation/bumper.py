@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from tablerunner.scenario import Outline
 from tablerunner.simulation.drive import Drive
-from tablerunner.simulation.truth import Contact, PersonState
+from tablerunner.simulation.truth import Contact, PersonState, RobotState
 
 Array = NDArray[np.float64]
 
-_FAULT_M_S = 0.05  # a robot that moves at a person faster than this has hit the person
+_FAULT_M_S = 0.05  # a robot that moves at somebody faster than this has hit them
 _APART_M = 0.02  # a touch has ended when the gap is this wide
 
 
@@ -34,12 +34,16 @@ class Bumper:
         self._free_m = 0.0
 
     def step(
-        self, stamp: int, drive: Drive, dt_s: float, people: Sequence[PersonState]
+        self,
+        stamp: int,
+        drive: Drive,
+        dt_s: float,
+        movers: Sequence[PersonState | RobotState],
     ) -> tuple[Contact, ...]:
         """Return the touches that began in this step; holds the robot before what it touches."""
         speed = drive.linear_m_s
         contacts = self._things(stamp, drive, dt_s)
-        contacts += self._people(stamp, drive, speed, people)
+        contacts += self._movers(stamp, drive, speed, movers)
         return tuple(contacts)
 
     def _things(self, stamp: int, drive: Drive, dt_s: float) -> list[Contact]:
@@ -57,7 +61,9 @@ class Bumper:
         key = (owner.kind, owner.name)
         if gap > 0.0:
             if gap > _APART_M:
-                self._touching = {pair for pair in self._touching if pair[0] == 'person'}
+                self._touching = {
+                    pair for pair in self._touching if pair[0] in {'person', 'robot'}
+                }
             return []
         course = drive.pose.heading
         towards = -(away[nearest] @ [math.cos(course), math.sin(course)])
@@ -69,15 +75,20 @@ class Bumper:
         self._touching.add(key)
         return [Contact(stamp, owner.kind, owner.name, True, max(closing, 0.0), drive.pose)]
 
-    def _people(
-        self, stamp: int, drive: Drive, speed: float, people: Sequence[PersonState]
+    def _movers(
+        self,
+        stamp: int,
+        drive: Drive,
+        speed: float,
+        movers: Sequence[PersonState | RobotState],
     ) -> list[Contact]:
         contacts = []
-        for person in people:
-            dx, dy = person.pose.x - drive.pose.x, person.pose.y - drive.pose.y
+        for other in movers:
+            dx, dy = other.pose.x - drive.pose.x, other.pose.y - drive.pose.y
             distance = math.hypot(dx, dy)
-            gap = distance - self._radius_m - person.radius_m
-            key = ('person', person.name)
+            gap = distance - self._radius_m - other.radius_m
+            kind = 'robot' if isinstance(other, RobotState) else 'person'
+            key = (kind, other.name)
             if gap > 0.0:
                 if gap > _APART_M:
                     self._touching.discard(key)
@@ -90,6 +101,6 @@ class Bumper:
                 self._touching.add(key)
                 at_fault = closing > _FAULT_M_S
                 contacts.append(
-                    Contact(stamp, 'person', person.name, at_fault, max(closing, 0.0), drive.pose)
+                    Contact(stamp, kind, other.name, at_fault, max(closing, 0.0), drive.pose)
                 )
         return contacts

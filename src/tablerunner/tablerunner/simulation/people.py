@@ -44,8 +44,8 @@ class Walker:
         pose = Pose2(self._x, self._y, self._heading)
         return PersonState(self._person.name, pose, self.speed_m_s, self._person.radius)
 
-    def step(self, dt_s: float, robot: Pose2, robot_radius_m: float) -> None:
-        """Walk on by `dt_s`, with the robot at `robot` in map."""
+    def step(self, dt_s: float, robots: Sequence[Pose2], robot_radius_m: float) -> None:
+        """Walk on by `dt_s`, with robots at `robots` in map."""
         self.speed_m_s = 0.0
         if len(self._route) < 2 or self._person.speed == 0.0:
             return
@@ -53,7 +53,7 @@ class Walker:
             self._pause_s -= dt_s
             return
         self._heading = self._course()
-        if self._must_stop(robot, robot_radius_m):
+        if self._must_stop(robots, robot_radius_m):
             self._waited_s += dt_s
             if self._waited_s > self._person.patience:
                 self._turn_round()
@@ -61,16 +61,24 @@ class Walker:
         self._waited_s = 0.0
         self._walk(dt_s)
 
-    def _must_stop(self, robot: Pose2, robot_radius_m: float) -> bool:
-        dx, dy = robot.x - self._x, robot.y - self._y
-        gap = math.hypot(dx, dy) - robot_radius_m - self._person.radius
-        ahead = abs(wrap(math.atan2(dy, dx) - self._heading)) < AHEAD_RAD
-        if gap > self._person.yield_distance or not ahead:
+    def _must_stop(self, robots: Sequence[Pose2], robot_radius_m: float) -> bool:
+        gaps = [
+            gap
+            for gap, ahead in (self._gap(robot, robot_radius_m) for robot in robots)
+            if ahead and gap <= self._person.yield_distance
+        ]
+        if not gaps:
             self._yields = None
             return False
         if self._yields is None:
             self._yields = bool(self._random.random() < self._person.yield_probability)
-        return self._yields or gap <= 0.0
+        return self._yields or min(gaps) <= 0.0
+
+    def _gap(self, robot: Pose2, robot_radius_m: float) -> tuple[float, bool]:
+        """Return the free space to a robot [m], and whether it is ahead."""
+        dx, dy = robot.x - self._x, robot.y - self._y
+        gap = math.hypot(dx, dy) - robot_radius_m - self._person.radius
+        return gap, abs(wrap(math.atan2(dy, dx) - self._heading)) < AHEAD_RAD
 
     def _walk(self, dt_s: float) -> None:
         left = self._person.speed * dt_s
@@ -141,8 +149,8 @@ class Crowd:
         ]
         self.states = tuple(walker.state for walker in self._walkers)
 
-    def step(self, dt_s: float, robot: Pose2, robot_radius_m: float) -> None:
+    def step(self, dt_s: float, robots: Sequence[Pose2], robot_radius_m: float) -> None:
         """Let everybody walk on by `dt_s`."""
         for walker in self._walkers:
-            walker.step(dt_s, robot, robot_radius_m)
+            walker.step(dt_s, robots, robot_radius_m)
         self.states = tuple(walker.state for walker in self._walkers)

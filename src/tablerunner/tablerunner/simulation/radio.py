@@ -154,12 +154,27 @@ class Links:
 class Radio:
     """The exchanges of the robot's tag with all anchors of the room in turn.
 
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+    own : str
+        Put before the names of the random streams of its links.
+    clocks : mapping of str to DeviceClock, optional
+        Of the anchors; made from the seed when not given.
+
     Attributes
     ----------
     links : Links
     """
 
-    def __init__(self, scenario: Scenario, seed: int) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        own: str = '',
+        clocks: Mapping[str, DeviceClock] | None = None,
+    ) -> None:
         errors = scenario.sensors.uwb
         self._anchors = scenario.anchors
         self._mount = scenario.robot.tag_position
@@ -170,8 +185,8 @@ class Radio:
             errors,
             scenario.tag_id,
             device_clock(errors, scenario.tag_id, seed),
-            {name: device_clock(errors, name, seed) for name in ids},
-            {name: stream(seed, f'uwb {name}') for name in ids},
+            clocks or {name: device_clock(errors, name, seed) for name in ids},
+            {name: stream(seed, f'{own}uwb {name}') for name in ids},
         )
         self._turn = 0
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tablerunner.geometry.circles import cast_rays_at_circles
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import Scenario
-from tablerunner.simulation.truth import PersonState
+from tablerunner.simulation.truth import PersonState, RobotState
 from tablerunner.types import UltrasonicSample
 
 Array = NDArray[np.float64]
@@ -24,8 +24,9 @@ class Sonar:
     """Five cones against everything that is at least as high as the sensors sit.
 
     Each cone is a fan of rays. A ray echoes from a flat thing when it meets it steeply enough
-    (beyond ``critical_incidence`` it is mirrored away), always near a corner, and from people. The
-    nearest echo counts; nearer than ``min_range`` it reads ``min_range``; none reads inf.
+    (beyond ``critical_incidence`` it is mirrored away), always near a corner, and from people and
+    other robots. The nearest echo counts; nearer than ``min_range`` it reads ``min_range``; none
+    reads inf.
     """
 
     def __init__(self, scenario: Scenario, random: np.random.Generator) -> None:
@@ -43,7 +44,9 @@ class Sonar:
         self._least_sine = math.cos(self._errors.critical_incidence)
         self._turn = 0
 
-    def fire(self, stamp: int, pose: Pose2, people: Sequence[PersonState]) -> UltrasonicSample:
+    def fire(
+        self, stamp: int, pose: Pose2, people: Sequence[PersonState | RobotState]
+    ) -> UltrasonicSample:
         """Return what the next sensor in turn hears, with base_link at `pose` in map."""
         mount = self._mounts[self._turn]
         self._turn = (self._turn + 1) % len(self._mounts)
@@ -69,7 +72,7 @@ class Sonar:
             errors.field_of_view,
         )
 
-    def _echo(self, at: Pose2, people: Sequence[PersonState]) -> float:
+    def _echo(self, at: Pose2, people: Sequence[PersonState | RobotState]) -> float:
         """Return the distance of the nearest echo before any error [m]; inf for none."""
         courses = at.heading + self._fan
         ray_x, ray_y = np.cos(courses)[:, None], np.sin(courses)[:, None]

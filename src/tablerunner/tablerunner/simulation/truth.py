@@ -42,11 +42,21 @@ class PersonState:
 
 
 @dataclass(frozen=True, slots=True)
+class RobotState:
+    """Where a robot is, as an obstacle for others."""
+
+    name: str
+    pose: Pose2  # base_link in map
+    speed_m_s: float
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Contact:
     """The robot touched something, or was touched; one record per touch, when it begins."""
 
     stamp: int
-    kind: str  # 'wall', 'table', 'box' or 'person'
+    kind: str  # 'wall', 'table', 'box', 'person' or 'robot'
     name: str
     robot_at_fault: bool
     closing_m_s: float  # speed of the robot towards it

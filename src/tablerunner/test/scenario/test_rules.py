@@ -195,6 +195,63 @@ def test_rules_refuse_tags_that_cannot_be(
     assert words in str(caught.value)
 
 
+SEVERAL = (
+    GOOD
+    + """\
+robots:
+  - {name: robot_1, start: [8.0, 6.0, 0.0]}
+  - {name: robot_2, start: [8.0, 7.0, 0.0], colour: [30, 190, 60]}
+  - {name: robot_3, start: [8.0, 5.0, 0.0], colour: [30, 90, 220], tag_id: T3}
+"""
+)
+
+
+def test_rules_accept_several_robots(tmp_path: Path) -> None:
+    load_text(tmp_path, SEVERAL)
+
+
+@pytest.mark.parametrize(
+    ('good', 'bad', 'field', 'words'),
+    [
+        ('name: robot_2', 'name: robot_1', 'robots[1].name', 'each name once'),
+        ('name: robot_2', 'name: 2nd', 'robots[1].name', 'a letter first'),
+        ('name: robot_2', 'name: a/b', 'robots[1].name', 'letters, digits'),
+        ('[8.0, 7.0, 0.0]', '[8.0, 6.4, 0.0]', 'robots[1].start', '0.5 m from that of robot_1'),
+        ('[8.0, 7.0, 0.0]', '[3.0, 3.0, 0.0]', 'robots[1].start', 'clear of table_1'),
+        ('[8.0, 7.0, 0.0]', '[9.9, 7.0, 0.0]', 'robots[1].start', 'clear of hull'),
+        ('[8.0, 7.0, 0.0]', '[12.0, 7.0, 0.0]', 'robots[1].start', 'inside the outer walls'),
+        ('[8.0, 7.0, 0.0]', '[8.0, .nan, 0.0]', 'robots[1].start[1]', 'a finite number'),
+        ('[30, 190, 60]', '[235, 60, 140]', 'robots[1].colour', 'from that of robot_1'),
+        ('[30, 90, 220]', '[30, 190, 90]', 'robots[2].colour', 'from that of robot_2'),
+        (', colour: [30, 190, 60]', '', 'robots[1].colour', 'from that of robot_1 (0 degrees'),
+        ('[30, 190, 60]', '[130, 140, 130]', 'robots[1].colour', 'not a grey'),
+        ('[30, 190, 60]', '[30, 300, 60]', 'robots[1].colour[1]', 'at most 255'),
+        ('tag_id: T3', 'tag_id: robot_2', 'robots[2].tag_id', 'than robots[1].tag_id'),
+        ('tag_id: T3', 'tag_id: A0', 'robots[2].tag_id', 'another name than anchors[0].id'),
+        (
+            'wheel_radius: 0.06',
+            'anchors: [{id: R0, position: [0, 0, 1]}]',
+            'robot.anchors',
+            'none where there are several robots',
+        ),
+    ],
+)
+def test_rules_refuse_robots_that_cannot_be(
+    tmp_path: Path, good: str, bad: str, field: str, words: str
+) -> None:
+    assert SEVERAL.count(good) == 1
+    with pytest.raises(ConfigError) as caught:
+        load_text(tmp_path, SEVERAL.replace(good, bad))
+    assert caught.value.field == field
+    assert words in str(caught.value)
+
+
+def test_rules_want_no_colours_of_robots_without_markers(tmp_path: Path) -> None:
+    load_text(
+        tmp_path, SEVERAL.replace('  marker: {height: 1.2}\n', '').replace('[30, 190, 60]', 'null')
+    )
+
+
 @pytest.mark.parametrize(
     ('text', 'words'),
     [

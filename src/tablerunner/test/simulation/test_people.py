@@ -19,7 +19,7 @@ RADIUS = 0.25
 
 def walk(walker: Walker, seconds: float, robot: Pose2 = FAR) -> None:
     for _ in range(round(seconds * 100)):
-        walker.step(0.01, robot, RADIUS)
+        walker.step(0.01, (robot,), RADIUS)
 
 
 def walker_of(person: Person, seed: int = 0) -> Walker:
@@ -84,7 +84,7 @@ def test_walker_pauses_as_often_and_as_long_as_configured(make_person: MakePerso
     walker = walker_of(person, seed=5)
     standing = 0
     for _ in range(200_000):
-        walker.step(0.01, FAR, RADIUS)
+        walker.step(0.01, (FAR,), RADIUS)
         standing += walker.state.speed_m_s == 0.0
     # In 2000 s: a leg takes 1 s and then 0.5 x 2 s on average, so half of the time is pause.
     assert standing / 200_000 == pytest.approx(0.5, abs=0.05)
@@ -166,7 +166,7 @@ def test_crowd_people_are_independent(make_person: MakePerson) -> None:
     second = make_person(name='second', **noisy)
     both, one = Crowd((first, second), seed=3), Crowd((second,), seed=3)
     for _ in range(5000):
-        both.step(0.01, FAR, RADIUS)
-        one.step(0.01, FAR, RADIUS)
+        both.step(0.01, (FAR,), RADIUS)
+        one.step(0.01, (FAR,), RADIUS)
     assert both.states[1] == one.states[0]
     assert both.states[0].pose != both.states[1].pose

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from tablerunner.scenario import Scenario
 from tablerunner.simulation.camera.view import CeilingView, RobotView
 from tablerunner.simulation.schedule import Schedule
-from tablerunner.simulation.truth import PersonState, Truth
+from tablerunner.simulation.truth import PersonState
 from tablerunner.types import ImageSample, nanoseconds, seconds
 
 
@@ -27,23 +27,28 @@ class CameraFeed:
     def __init__(self, scenario: Scenario, seed: int, start_ns: int) -> None:
         self.view = CeilingView(scenario, seed)
         camera = self.view.camera
-        self._robot = scenario.robot
         self._due = Schedule(1.0 / camera.rate, start_ns)
         self._delay_ns = nanoseconds(camera.delay)
         self._waiting: deque[ImageSample] = deque()
 
-    def step(self, truth: Truth, people: Sequence[PersonState]) -> ImageSample | None:
-        """Return the picture that arrives now, if one does."""
-        now = truth.stamp
+    def step(
+        self,
+        now: int,
+        robots: Callable[[], Sequence[RobotView]],
+        people: Sequence[PersonState],
+    ) -> ImageSample | None:
+        """Return the picture that arrives now, if one does.
+
+        Parameters
+        ----------
+        now : int
+            Stamp [ns].
+        robots : callable
+            Returns all robots as they are now; asked only where a picture is exposed.
+        people : sequence of PersonState
+        """
         if self._due.is_due(now):
-            robot = RobotView(
-                truth.pose,
-                self._robot.footprint_radius,
-                self._robot.marker,
-                truth.linear_m_s,
-                truth.angular_rad_s,
-            )
-            pixels = self.view.draw(seconds(now), (robot,), people)
+            pixels = self.view.draw(seconds(now), robots(), people)
             self._waiting.append(ImageSample(now, pixels))
         if self._waiting and now >= self._waiting[0].stamp + self._delay_ns:
             return self._waiting.popleft()

@@ -16,8 +16,8 @@ from tablerunner.simulation.fleet.draws import Draws
 from tablerunner.simulation.fleet.radio import FleetRadio
 from tablerunner.simulation.fleet.record import FleetRecord
 from tablerunner.simulation.schedule import Schedule
-from tablerunner.simulation.simulator import START_NS, STEP_NS
 from tablerunner.simulation.streams import stream
+from tablerunner.simulation.team import START_NS, STEP_NS
 from tablerunner.types import seconds
 
 Array = NDArray[np.float64]
