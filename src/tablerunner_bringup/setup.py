@@ -22,12 +22,16 @@ setup(
         (f'share/{PACKAGE}/scenarios', sorted(glob('scenarios/*.yaml'))),
         (f'share/{PACKAGE}/dds', sorted(glob('dds/*.xml'))),
         (f'share/{PACKAGE}/rviz', sorted(glob('rviz/*.rviz'))),
+        (f'share/{PACKAGE}/foxglove', sorted(glob('foxglove/*.json'))),
     ],
     install_requires=['setuptools'],
     zip_safe=False,
     entry_points={
         # Commands that need ROS; they join the tablerunner command of the core.
         'tablerunner.commands': [
+            'drive = tablerunner_bringup.drive_command:drive',
+            'emulate = tablerunner_bringup.emulator.command:emulate',
+            'doctor = tablerunner_bringup.doctor.command:doctor',
             'demo = tablerunner_bringup.commands:demo',
             'launch = tablerunner_bringup.commands:launch',
             'record = tablerunner_bringup.commands:record',

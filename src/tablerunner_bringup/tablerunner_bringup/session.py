@@ -62,6 +62,7 @@ class SessionSettings:
     record_topics: tuple[str, ...] = ()
     domain: int | None = None
     parameter_files: tuple[Path, ...] = ()
+    remap: tuple[str, ...] = ()  # rules of ROS, OLD:=NEW, for every node
     up_limit_s: float = _UP_LIMIT_S
 
 
@@ -134,10 +135,11 @@ class Session:
         self._domain = self._choose_domain()
         self._context = self._stack.enter_context(bare_context(self._domain))
         self._progress.say(f'run in {self.folder.path}, ROS domain {self._domain_words}')
-        self.monitor = Monitor(self.node('tablerunner_launcher'))
+        odom = self._options.odom_topic or 'odom'
+        self.monitor = Monitor(self.node('tablerunner_launcher'), odom)
         for robot in dict.fromkeys(node.options.robot for node in self._nodes):
             if robot:
-                self.robots[robot] = Monitor(self.node('tablerunner_launcher', robot))
+                self.robots[robot] = Monitor(self.node('tablerunner_launcher', robot), odom)
         if not self.robots:
             self.robots[''] = self.monitor
         if self._settings.record:
@@ -198,6 +200,8 @@ class Session:
             arguments += ['-r', f'__ns:=/{namespace.strip("/")}']
         for old, new in spec.remap:
             arguments += ['-r', f'{old}:={new}']
+        for rule in self._settings.remap:
+            arguments += ['-r', rule]
         for path in (file, *self._settings.parameter_files):
             arguments += ['--params-file', str(path.resolve())]
         return Command(
