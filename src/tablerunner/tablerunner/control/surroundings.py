@@ -49,13 +49,13 @@ class SurroundingsConfig(Config):
         above=0.0,
     )
     explained: float = parameter(
-        0.15,
+        0.25,
         description='An echo is of the map when something on it is so near the arc',
         unit='m',
         low=0.0,
     )
     foreign: float = parameter(
-        0.25,
+        0.3,
         description='The robot is careful of echoes that are farther from all on the map',
         unit='m',
         low=0.0,
