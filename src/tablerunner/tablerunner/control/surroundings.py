@@ -31,6 +31,7 @@ _ELSEWHERE = 0.15
 _BLUR_M = 0.08  # places are found wider than they are
 _COMPARED_S = 0.4  # readings farther apart than this are not compared
 _AHEAD_RAD = math.radians(60.0)
+_BESIDE_SHARE = 1.5
 _TURNED_RAD = 0.1
 _RUNNING_M_S = 2.5  # nearer by more: another thing than before
 
@@ -140,7 +141,8 @@ class Surroundings:
         Returns
         -------
         tuple of float
-            Distances of new echoes from ahead that the map does not explain [m].
+            How near it is to what the map does not explain, by new echoes [m]; from beside half as
+            much again, for who comes from there comes at a slant.
         """
         unknown: list[float] = []
         dt = 0.0 if self._last is None else max(seconds(stamp - self._last), 0.0)
@@ -158,9 +160,9 @@ class Surroundings:
                 if known_m > self.config.explained:
                     self._compare(sensor, distance, at, stamp)
                 # Nearer to what is on the map a pose that is off may be the reason.
-                is_ahead = abs(self._mounts[sensor].heading) < _AHEAD_RAD
-                if known_m > self.config.foreign and is_ahead:
-                    unknown.append(distance)
+                if known_m > self.config.foreign:
+                    is_ahead = abs(self._mounts[sensor].heading) < _AHEAD_RAD
+                    unknown.append(distance if is_ahead else _BESIDE_SHARE * distance)
                 self._before[sensor] = stamp, distance, at
         return tuple(unknown)
 
