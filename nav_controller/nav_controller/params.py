@@ -123,6 +123,9 @@ class NavNodeConfig(Config):
         )
 
 
+NAV_TWISTS = ('same', 'twist', 'twist_stamped')
+
+
 @dataclass(frozen=True)
 class SafetyNodeConfig(Config):
     """Everything about safety_stop."""
@@ -157,7 +160,12 @@ class SafetyNodeConfig(Config):
         high=5.0,
     )
     twist_stamped: bool = parameter(
-        False, description='Whether cmd_vel_nav and cmd_vel are TwistStamped instead of Twist'
+        False, description='Whether cmd_vel is TwistStamped instead of Twist'
+    )
+    nav_twist: str = parameter(
+        NAV_TWISTS[0],
+        description='Type of cmd_vel_nav: the same as of cmd_vel, or another',
+        choices=NAV_TWISTS,
     )
     limits: VelocityLimits = parameter(
         factory=VelocityLimits, description='Velocity limits, within those of the base'
@@ -177,6 +185,13 @@ class SafetyNodeConfig(Config):
             )
         if len(set(self.ultrasonic_frames)) != len(self.ultrasonic_frames):
             raise ConfigError('ultrasonic_frames', list(self.ultrasonic_frames), 'each frame once')
+
+    @property
+    def takes_stamped(self) -> bool:
+        """Whether cmd_vel_nav is TwistStamped."""
+        if self.nav_twist == 'same':
+            return self.twist_stamped
+        return self.nav_twist == 'twist_stamped'
 
     @property
     def mounts(self) -> dict[str, Pose2]:

@@ -82,7 +82,8 @@ class SafetyNode(Node):
         self._diagnostics.describe(self._describe)
         self._listen(Odometry, POSE, self._on_pose)
         self._listen(DiagnosticStatus, 'fusion_state', self._on_fusion)
-        self._listen(kind, COMMAND, self._on_command)
+        taken = TwistStamped if config.takes_stamped else Twist
+        self._listen(taken, COMMAND, self._on_command)
         self.create_service(Trigger, 'emergency_stop', self._on_emergency)
         self.create_service(Trigger, 'release', self._on_release)
         # Wall time: it has to fire also when /clock stands.

@@ -316,6 +316,31 @@ def test_stamped_commands_by_parameter(probe: Probe, make_robot: Callable[..., A
     probe.wait_for(lambda: heard[-1].twist.linear.x == 0.0, 'a stop for old commands')
 
 
+@pytest.mark.parametrize('stamped', [False, True], ids=['twist out', 'stamped out'])
+def test_command_of_one_type_becomes_one_of_the_other(
+    probe: Probe, make_robot: Callable[..., Any], stamped: bool
+) -> None:
+    """Nav2 of Jazzy says Twist, diff_drive_controller wants TwistStamped; and the reverse."""
+    taken, given = (Twist, TwistStamped) if stamped else (TwistStamped, Twist)
+    make_robot()
+    heard = probe.listen(given, 'cmd_vel')
+    parameters = {'twist_stamped': stamped, 'nav_twist': 'twist' if stamped else 'twist_stamped'}
+    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+    probe.host(SafetyNode, parameter_overrides=overrides)
+    probe.speak(taken, 'cmd_vel_nav')
+
+    def command() -> None:
+        message = twist(0.1)
+        if not stamped:
+            message = TwistStamped(twist=message)
+            message.header.stamp = probe.node.get_clock().now().to_msg()
+        probe.publish('cmd_vel_nav', message)
+
+    probe.node.create_timer(0.05, command)
+    speed = (lambda m: m.twist.linear.x) if stamped else (lambda m: m.linear.x)
+    probe.wait_for(lambda: heard and speed(heard[-1]) == pytest.approx(0.1), 'driving')
+
+
 def test_geometry_comes_from_the_scenario(probe: Probe, room: Path) -> None:
     text = room.read_text() + 'robot: {limits: {speed: 0.25}}\n'
     room.write_text(text)

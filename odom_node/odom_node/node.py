@@ -8,7 +8,9 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 
+from odom_node.imu_mount import ImuMount
 from odom_node.params import OdomNodeConfig
+from tablerunner.messages.wheels import OTHER_JOINTS
 from tablerunner.odometry import Odometer, OdometerConfig
 from tablerunner.types import Refusal
 from tablerunner_ros.conversions.imu import imu_from_message
@@ -32,6 +34,7 @@ class OdomNode(Node):
         self._config = config = declare_config(self, OdomNodeConfig)
         self._stamps = StampCheck(self, declare_config(self, StampConfig))
         self._odometer = Odometer(declare_config(self, OdometerConfig, on_change=self._configure))
+        self._mount = ImuMount(self, config)
         self._message = Odometry()
         self._message.header.frame_id = config.odom_frame
         self._message.child_frame_id = config.base_frame
@@ -51,9 +54,11 @@ class OdomNode(Node):
         self.create_subscription(Imu, IMU, self._on_imu, qos_for(IMU, subscriber=True))
 
     def _on_wheels(self, message: JointState) -> None:
-        sample = wheels_from_message(message, self._config.left_joint, self._config.right_joint)
+        config = self._config
+        sample = wheels_from_message(message, config.left_joints, config.right_joints)
         if isinstance(sample, Refusal):
-            self._diagnostics.refuse(sample)
+            # An arm, too, may publish its joints here: no fault while the wheels come as well.
+            self._diagnostics.refuse(sample, expected=sample.reason == OTHER_JOINTS)
             return
         if self._stamps.is_future(sample.stamp):
             self._diagnostics.refuse(Refusal(sample.stamp, WHEELS, '', FUTURE))
@@ -78,7 +83,8 @@ class OdomNode(Node):
             )
 
     def _on_imu(self, message: Imu) -> None:
-        sample = imu_from_message(message, self._config.imu_heading)
+        mount = self._mount.of(message)
+        sample = mount if isinstance(mount, Refusal) else imu_from_message(message, mount=mount)
         if isinstance(sample, Refusal):
             self._diagnostics.refuse(sample)
             return

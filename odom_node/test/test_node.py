@@ -261,7 +261,12 @@ def test_odom_parameter_changed_while_it_runs(wheels: Wheels) -> None:
     [
         ({'wheels.track': -1.0}, 'wheels.track: got -1.0, expected a number above 0'),
         ({'heading_source': 'stars'}, "heading_source: got 'stars', expected one of wheels, gyro"),
-        ({'left_joint': 3}, 'left_joint: got 3, expected text'),
+        ({'left_joints': ['a', 'b']}, "right_joints: got ['right_wheel_joint'], expected as many"),
+        (
+            {'right_joints': [LEFT]},
+            f"right_joints: got ['{LEFT}'], expected each joint named once",
+        ),
+        ({'imu_tilt': [0.1]}, 'imu_tilt: got [0.1], expected roll and pitch'),
     ],
 )
 def test_odom_bad_parameter_is_named(probe: Probe, parameters: dict[str, Any], words: str) -> None:

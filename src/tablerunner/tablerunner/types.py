@@ -95,13 +95,30 @@ class Anchor:
 
 @dataclass(frozen=True, slots=True)
 class WheelSample:
-    """Angles and speeds of both drive wheels, forward positive."""
+    """Angles and speeds of both drive wheels, forward positive; NaN where not measured.
+
+    `further` holds the same four numbers of each further pair, of a robot with several driven
+    wheels on a side.
+    """
 
     stamp: int
     left_angle_rad: float
     right_angle_rad: float
     left_speed_rad_s: float = float('nan')
     right_speed_rad_s: float = float('nan')
+    further: tuple[tuple[float, float, float, float], ...] = ()
+
+    @property
+    def angles_rad(self) -> tuple[float, ...]:
+        """Angles of left and right wheel, pair after pair."""
+        more = [number for pair in self.further for number in pair[:2]]
+        return (self.left_angle_rad, self.right_angle_rad, *more)
+
+    @property
+    def speeds_rad_s(self) -> tuple[float, ...]:
+        """Speeds of left and right wheel, pair after pair."""
+        more = [number for pair in self.further for number in pair[2:]]
+        return (self.left_speed_rad_s, self.right_speed_rad_s, *more)
 
 
 @dataclass(frozen=True, slots=True)

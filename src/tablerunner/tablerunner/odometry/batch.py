@@ -115,7 +115,7 @@ def dead_reckon(
     yaw_rate : ndarray, shape (i, runs)
         [rad/s]. Of an IMU sample and a wheel sample with one stamp, the wheels come first.
     """
-    rolled = np.diff(wheels, axis=0) * config.wheels.wheel_radius
+    rolled = np.diff(wheels, axis=0) * np.array(config.wheels.radii_m)[:, None]
     distance = 0.5 * (rolled[:, 0] + rolled[:, 1])
     turn = (rolled[:, 1] - rolled[:, 0]) / config.wheels.track
     missing = np.zeros_like(turn)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Quaternion, Twist
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Range
 
 from tablerunner.geometry.angles import difference
+from tablerunner.geometry.rotation import quaternion_of_rpy, rotation_of_rpy
 from tablerunner.types import (
     ImuSample,
     MagneticSample,
@@ -65,15 +67,44 @@ def test_wheels_are_found_by_name_among_other_joints(names: list[str]) -> None:
     assert math.isnan(result.left_speed_rad_s)
 
 
+@pytest.mark.parametrize('angles', [[NAN, NAN, NAN], []], ids=['NaN', 'none'])
+def test_wheels_that_measure_speeds_only(angles: list[float]) -> None:
+    """joint_state_broadcaster writes NaN for what no joint has; other drivers leave it out."""
+    message = wheels_to_message(WheelSample(5, 0.0, 0.0), LEFT, RIGHT)
+    message.name = ['arm', RIGHT, LEFT]
+    message.position, message.velocity = angles, [NAN, 2.0, 1.0]
+    sample = wheels_from_message(wired(message), LEFT, RIGHT)
+    assert isinstance(sample, WheelSample)
+    assert sample.speeds_rad_s == (1.0, 2.0)
+    assert all(math.isnan(angle) for angle in sample.angles_rad)
+
+
+@given(st.permutations(['front_left', 'front_right', 'rear_left', 'rear_right', 'arm']))
+def test_wheels_of_several_on_a_side_are_paired(names: list[str]) -> None:
+    """Left with right as the parameters list them, in whatever order a message has them."""
+    value = {'front_left': 1.0, 'front_right': 2.0, 'rear_left': 3.0, 'rear_right': 4.0}
+    message = wheels_to_message(WheelSample(5, 0.0, 0.0), LEFT, RIGHT)
+    message.name = names
+    message.position = [value.get(name, NAN) for name in names]
+    message.velocity = [10.0 * value.get(name, NAN) for name in names]
+    sample = wheels_from_message(
+        wired(message), ('front_left', 'rear_left'), ('front_right', 'rear_right')
+    )
+    assert isinstance(sample, WheelSample)
+    assert sample.angles_rad == (1.0, 2.0, 3.0, 4.0)
+    assert sample.speeds_rad_s == (10.0, 20.0, 30.0, 40.0)
+
+
 @pytest.mark.parametrize(
     ('change', 'key', 'reason'),
     [
         (lambda m: setattr(m, 'name', ['left', 'other']), 'right', 'joint is missing'),
         (lambda m: setattr(m, 'name', []), 'left', 'joint is missing'),
+        (lambda m: setattr(m, 'name', ['arm', 'head']), '', 'of other joints'),
         (lambda m: setattr(m, 'position', [1.0]), '', 'names and positions differ in number'),
-        (lambda m: setattr(m, 'position', []), '', 'names and positions differ in number'),
-        (lambda m: setattr(m, 'position', [1.0, NAN]), '', 'wheel angle is not finite'),
-        (lambda m: setattr(m, 'position', [math.inf, 1.0]), '', 'wheel angle is not finite'),
+        (lambda m: setattr(m, 'position', []), 'left', 'wheel angle is not finite'),
+        (lambda m: setattr(m, 'position', [1.0, NAN]), 'right', 'wheel angle is not finite'),
+        (lambda m: setattr(m, 'position', [math.inf, 1.0]), 'left', 'wheel angle is not finite'),
         (lambda m: setattr(m, 'velocity', [1.0]), '', 'names and velocities differ in number'),
     ],
 )
@@ -125,6 +156,57 @@ def test_imu_mounted_askew_is_turned_into_the_robot(mount: float, heading: float
     assert back.forward_acceleration_m_s2 == pytest.approx(1.0)
     assert back.lateral_acceleration_m_s2 == pytest.approx(0.0, abs=1e-12)
     assert abs(difference(back.yaw_rad, heading - mount)) < 1e-9
+
+
+@given(headings, st.floats(-1.5, 1.5), headings, headings, st.floats(-3.0, 3.0))
+def test_imu_mounted_anyhow_is_turned_into_the_robot(
+    roll: float, pitch: float, yaw: float, heading: float, rate: float
+) -> None:
+    """A robot on the floor that turns and accelerates, felt in the axes of a tilted IMU.
+
+    What the IMU says is made with vectors and quaternions, what comes back with the mounting's
+    matrix.
+    """
+    mount = rotation_of_rpy(roll, pitch, yaw)
+    message = imu_to_message(ImuSample(1, 0.0, 0.0, 0.0, heading, 1.0), 'imu_link')
+    turn, felt = message.angular_velocity, message.linear_acceleration
+    turn.x, turn.y, turn.z = (float(number) for number in mount.T @ (0.0, 0.0, rate))
+    felt.x, felt.y, felt.z = (float(number) for number in mount.T @ (0.5, 0.25, 9.81))
+    message.angular_velocity_covariance = [float(number) for number in np.diag([4.0] * 3).ravel()]
+    base = np.array([0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading)])
+    x, y, z, w = quaternion_product(base, np.array(quaternion_of_rpy(roll, pitch, yaw)))
+    message.orientation = Quaternion(x=x, y=y, z=z, w=w)
+    sample = imu_from_message(wired(message), mount=mount)
+    assert isinstance(sample, ImuSample)
+    assert sample.yaw_rate_rad_s == pytest.approx(rate, abs=1e-9)
+    assert sample.yaw_rate_variance == pytest.approx(4.0)
+    assert sample.forward_acceleration_m_s2 == pytest.approx(0.5, abs=1e-9)
+    assert sample.lateral_acceleration_m_s2 == pytest.approx(0.25, abs=1e-9)
+    assert abs(difference(sample.yaw_rad, heading)) < 1e-6
+
+
+def quaternion_product(one: np.ndarray, two: np.ndarray) -> list[float]:
+    """Return the rotation by `two`, then by `one` (x, y, z, w)."""
+    vector = one[3] * two[:3] + two[3] * one[:3] + np.cross(one[:3], two[:3])
+    return [*map(float, vector), float(one[3] * two[3] - one[:3] @ two[:3])]
+
+
+def test_imu_upside_down_turns_the_other_way() -> None:
+    """Rolled by half a turn: what it feels as clockwise is counter-clockwise."""
+    message = wired(imu_to_message(ImuSample(1, -0.5), 'imu_link'))
+    sample = imu_from_message(message, mount=rotation_of_rpy(math.pi, 0.0, 0.0))
+    assert isinstance(sample, ImuSample)
+    assert sample.yaw_rate_rad_s == pytest.approx(0.5)
+
+
+def test_imu_whose_orientation_is_all_zeros_has_none() -> None:
+    """As drivers of bare gyroscopes leave it, the covariance of -1 forgotten."""
+    message = imu_to_message(ImuSample(1, 0.5, 0.0, 0.0, 0.3), 'imu_link')
+    message.orientation = Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
+    sample = imu_from_message(wired(message))
+    assert isinstance(sample, ImuSample)
+    assert math.isnan(sample.yaw_rad)
+    assert sample.yaw_rate_rad_s == 0.5
 
 
 @pytest.mark.parametrize(
