@@ -21,6 +21,7 @@ setup(
     entry_points={
         'console_scripts': [
             'odom_node = odom_node.node:main',
+            'sensor_frames = odom_node.frames_node:main',
         ],
     },
 )

@@ -25,17 +25,21 @@ def test_nodes_page_has_the_parameters_of_the_configs() -> None:
     assert fill(text) == text, 'run: python3 -m tablerunner_ros.parameter_table docs/nodes.md'
 
 
-@pytest.mark.parametrize('name', ['uwb_driver', 'odom_node', 'ceiling_camera', 'fusion_node'])
+@pytest.mark.parametrize(
+    'name', ['uwb_driver', 'odom_node', 'sensor_frames', 'ceiling_camera', 'fusion_node']
+)
 def test_nodes_page_lists_all_that_a_node_declares(name: str) -> None:
     """The Configs named on the page are those the node declares, none forgotten."""
     from ceiling_camera.node import CeilingCameraNode
     from fusion_node.node import FusionNode
+    from odom_node.frames_node import FramesNode
     from odom_node.node import OdomNode
     from uwb_driver.node import UwbDriver
 
     make: dict[str, type[Node]] = {
         'uwb_driver': UwbDriver,
         'odom_node': OdomNode,
+        'sensor_frames': FramesNode,
         'ceiling_camera': CeilingCameraNode,
         'fusion_node': FusionNode,
     }

@@ -46,12 +46,27 @@ def launch(
     sim: Annotated[
         bool, typer.Option('--sim/--no-sim', help='Simulate, or drive a real robot.')
     ] = True,
+    localization_only: Annotated[
+        bool,
+        typer.Option('--localization-only', help='Somebody else drives (Nav2): pose and TF only.'),
+    ] = False,
+    odom_topic: Annotated[
+        str, typer.Option(help='Odometry of somebody else in the place of odom_node.')
+    ] = '',
+    robot_description: Annotated[
+        bool,
+        typer.Option('--robot-description', help='robot_state_publisher tells of the sensors.'),
+    ] = False,
     unknown_start: _UnknownStart = False,
     estimator: _Estimator = 'ekf',
     real_time_factor: _Factor = 1.0,
     params: Annotated[
         Optional[list[Path]],
         typer.Option(exists=True, help='ROS parameter file over all others; may be repeated.'),
+    ] = None,
+    remap: Annotated[
+        Optional[list[str]],
+        typer.Option('--remap', help='OLD:=NEW name of a topic, in every node; may be repeated.'),
     ] = None,
     domain: _Domain = None,
     output: Annotated[
@@ -67,13 +82,23 @@ def launch(
     from tablerunner_bringup.launching import launch as run
     from tablerunner_bringup.session import SessionSettings
 
+    run_options = _run_options(
+        scenario, seed, unknown_start, estimator, real_time_factor, namespace, sim
+    ).replace(
+        localization_only=localization_only,
+        odom_topic=odom_topic,
+        robot_description=robot_description,
+    )
+    if localization_only and stops:
+        raise typer.BadParameter('nobody drives then', param_hint='--deliver')
     options = LaunchOptions(
-        _run_options(scenario, seed, unknown_start, estimator, real_time_factor, namespace, sim),
+        run_options,
         SessionSettings(
             record=record_bag or bool(record_topics),
             record_topics=tuple(map(_absolute, record_topics or ())),
             domain=domain,
             parameter_files=tuple(params or ()),
+            remap=tuple(map(_rule, remap or ())),
         ),
         tuple(stops or ()),
         wait,
@@ -254,8 +279,13 @@ def _absolute(topic: str) -> str:
     return topic if topic.startswith('/') else f'/{topic}'
 
 
-def _renaming(text: str) -> tuple[str, str]:
+def _rule(text: str) -> str:
     old, found, new = text.partition(':=')
     if not (old and found and new):
         raise typer.BadParameter(f'{text!r}: expected OLD:=NEW', param_hint='--remap')
+    return text
+
+
+def _renaming(text: str) -> tuple[str, str]:
+    old, _, new = _rule(text).partition(':=')
     return _absolute(old), _absolute(new)

@@ -26,6 +26,9 @@ ARGUMENTS: tuple[tuple[str, str, str], ...] = (
     ('unknown_start', 'false', 'Whether the robot is not told where it stands'),
     ('real_time_factor', str(_DEFAULTS.real_time_factor), 'Simulated seconds per second'),
     ('estimator', _DEFAULTS.estimator, 'Estimator of fusion_node'),
+    ('localization_only', 'false', 'Whether somebody else drives, as Nav2: map to odom and pose'),
+    ('odom_topic', '', 'Odometry of somebody else; empty: that of odom_node'),
+    ('robot_description', 'false', 'Whether robot_state_publisher tells where the sensors sit'),
     ('params', '', 'ROS parameter file over all others'),
 )
 """Launch arguments: name, default, description."""
@@ -77,6 +80,9 @@ def _options(values: Mapping[str, str]) -> RunOptions:
         'unknown_start': _truth('unknown_start', values),
         'real_time_factor': _number('real_time_factor', values, float),
         'estimator': values['estimator'],
+        'localization_only': _truth('localization_only', values),
+        'odom_topic': values['odom_topic'],
+        'robot_description': _truth('robot_description', values),
     }
     return build(RunOptions, Document(data, 'launch arguments'))
 

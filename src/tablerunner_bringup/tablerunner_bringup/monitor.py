@@ -52,13 +52,13 @@ class Touch:
 class Monitor:
     """Polls the topics of one robot; `poll` at whatever pace the news is wanted."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, odom_topic: str = 'odom') -> None:
         self._node = node
         self._estimate = Newest(
             node, Odometry, 'odometry/filtered', qos_for('odometry/filtered', subscriber=True)
         )
         self._truth = Newest(node, Odometry, 'ground_truth', qos_for('ground_truth'))
-        self._odom = Newest(node, Odometry, 'odom', qos_for('odom'))
+        self._odom = Newest(node, Odometry, odom_topic, qos_for('odom'))
         self._diagnostics = node.create_subscription(
             DiagnosticArray,
             'diagnostics',

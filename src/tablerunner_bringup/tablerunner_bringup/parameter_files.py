@@ -20,6 +20,7 @@ import yaml
 from ceiling_camera.params import CeilingCameraConfig
 from fusion_node.params import FusionNodeConfig
 from nav_controller.params import NavNodeConfig, SafetyNodeConfig
+from odom_node.frames_params import SensorFramesConfig
 from odom_node.params import OdomNodeConfig
 from sim_bridge.params import BridgeConfig
 from tablerunner.config import Config, Parameter, parameters_of
@@ -42,6 +43,7 @@ CONFIGS: dict[str, tuple[type[Config], ...]] = {
     ),
     'ceiling_camera': (CeilingCameraConfig, StampConfig, LocatorConfig),
     'odom_node': (OdomNodeConfig, StampConfig, OdometerConfig),
+    'sensor_frames': (SensorFramesConfig,),
     'fusion_node': (FusionNodeConfig, StampConfig, SmootherConfig, LocalizerConfig),
     'nav_controller': (NavNodeConfig,),
     'safety_stop': (SafetyNodeConfig,),

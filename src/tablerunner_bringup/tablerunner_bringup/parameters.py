@@ -60,6 +60,23 @@ def odom_node(scenario: Scenario, options: RunOptions) -> Parameters:
     }
 
 
+def sensor_frames(scenario: Scenario, options: RunOptions) -> Parameters:
+    """Return where the sensors sit on the robot: no URDF says it, the scenario does."""
+    robot = scenario.robot
+    poses = {
+        'imu_link': (*robot.imu_position, 0.0, 0.0, 0.0),
+        'uwb_tag': (*robot.tag_position, 0.0, 0.0, 0.0),
+    }
+    for mount in robot.ultrasonics:
+        place = (mount.x, mount.y, robot.ultrasonic_height)
+        poses[mount.frame] = (*place, 0.0, 0.0, mount.heading)
+    return {
+        **_common(options),
+        'frames': list(poses),
+        'poses': [float(number) for pose in poses.values() for number in pose],
+    }
+
+
 def ceiling_camera(scenario: Scenario, options: RunOptions) -> Parameters:
     """Return where the camera was measured to hang, and the marker that the robot wears."""
     told: Parameters = _common(options)

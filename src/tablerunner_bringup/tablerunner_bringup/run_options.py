@@ -23,6 +23,15 @@ class RunOptions(Config):
         1.0, description='Simulated seconds per second', above=0.0, high=100.0
     )
     estimator: str = parameter('ekf', description='Estimator of fusion_node')
+    localization_only: bool = parameter(
+        False, description='Whether somebody else (Nav2) drives: map to odom and pose, no more'
+    )
+    odom_topic: str = parameter(
+        '', description='Odometry of somebody else, as of diff_drive_controller; empty: odom_node'
+    )
+    robot_description: bool = parameter(
+        False, description='Whether robot_state_publisher tells where the sensors sit'
+    )
 
     @property
     def scenario_path(self) -> Path:

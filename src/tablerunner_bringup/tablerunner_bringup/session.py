@@ -61,6 +61,7 @@ class SessionSettings:
     record_topics: tuple[str, ...] = ()
     domain: int | None = None
     parameter_files: tuple[Path, ...] = ()
+    remap: tuple[str, ...] = ()  # rules of ROS, OLD:=NEW, for every node
     up_limit_s: float = _UP_LIMIT_S
 
 
@@ -121,7 +122,9 @@ class Session:
             allow_large_messages(os.environ)
         self._domain = self._choose_domain()
         self._progress.say(f'run in {self.folder.path}, ROS domain {self._domain_words}')
-        self.monitor = Monitor(self.node('tablerunner_launcher'))
+        self.monitor = Monitor(
+            self.node('tablerunner_launcher'), self._options.odom_topic or 'odom'
+        )
         if self._settings.record:
             self._supervisor.start(self._recorder_command())
         for spec in self._specs:
@@ -173,6 +176,8 @@ class Session:
             arguments += ['-r', f'__ns:=/{self._options.namespace.strip("/")}']
         for old, new in spec.remap:
             arguments += ['-r', f'{old}:={new}']
+        for rule in self._settings.remap:
+            arguments += ['-r', rule]
         for path in (file, *self._settings.parameter_files):
             arguments += ['--params-file', str(path.resolve())]
         return Command(

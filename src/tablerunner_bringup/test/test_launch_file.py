@@ -12,9 +12,11 @@ import pytest
 import yaml
 
 from tablerunner.errors import ConfigError
+from tablerunner.scenario import load_scenario
 from tablerunner_bringup import parameters
 from tablerunner_bringup.description import ARGUMENTS, describe
-from tablerunner_bringup.nodes import NODES, nodes_of
+from tablerunner_bringup.nodes import nodes_of
+from tablerunner_bringup.run_options import RunOptions
 
 FILE = Path(__file__).parents[1] / 'launch' / 'delivery.launch.py'
 RESTAURANT = Path(__file__).parents[1] / 'scenarios' / 'restaurant.yaml'
@@ -63,7 +65,8 @@ def test_launch_file_makes_the_nodes_of_the_list(description):
     function = description.arguments[0][-1].named['function']
     made = function({**DEFAULTS, 'namespace': 'robot2', 'params': 'mine.yaml'})
     assert [(item.named['package'], item.named['executable']) for item in made] == [
-        (spec.package, spec.executable) for spec in NODES if spec.name != 'ceiling_camera'
+        (spec.package, spec.executable)
+        for spec in nodes_of(RunOptions(), load_scenario(RESTAURANT))
     ]
     for item in made:
         assert item.named['namespace'] == 'robot2'

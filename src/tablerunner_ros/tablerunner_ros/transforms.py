@@ -12,7 +12,9 @@ from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from tf2_msgs.msg import TFMessage
 
+from tablerunner.geometry.frame_tree import Link
 from tablerunner.geometry.pose import Pose2
+from tablerunner.geometry.rotation import quaternion_of_rotation
 from tablerunner_ros.conversions.stamp import fill_stamp
 from tablerunner_ros.qos import qos_for
 
@@ -34,6 +36,19 @@ def fill_transform(message: TransformStamped, stamp: int, pose: Pose2) -> None:
     transform.translation.y = pose.y
     transform.rotation.z = math.sin(0.5 * pose.heading)
     transform.rotation.w = math.cos(0.5 * pose.heading)
+
+
+def link_to_message(link: Link, stamp: int = 0) -> TransformStamped:
+    """Return one frame in its parent as a message."""
+    message = TransformStamped()
+    message.header.frame_id = link.parent
+    message.child_frame_id = link.child
+    fill_stamp(message.header.stamp, stamp)
+    transform = message.transform
+    place, turn = transform.translation, transform.rotation
+    place.x, place.y, place.z = link.translation
+    turn.x, turn.y, turn.z, turn.w = quaternion_of_rotation(link.rotation)
+    return message
 
 
 class TransformBroadcaster:

@@ -54,6 +54,32 @@ def quaternion_of_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     )
 
 
+def quaternion_of_rotation(rotation: Rotation) -> Quaternion:
+    """Return a rotation as a unit quaternion x, y, z, w, w at least 0.
+
+    The largest part is found first, so that nothing is divided by a small number.
+    """
+    trace = float(np.trace(rotation))
+    squares = [1.0 + 2.0 * float(rotation[k, k]) - trace for k in range(3)]
+    squares.append(1.0 + trace)
+    largest = int(np.argmax(squares))
+    parts = [0.0] * 4
+    parts[largest] = 0.5 * math.sqrt(squares[largest])
+    share = 0.25 / parts[largest]
+    for k in range(3):
+        after, last = (k + 1) % 3, (k + 2) % 3
+        twist = float(rotation[last, after] - rotation[after, last])  # 4 w times part k
+        if largest == 3:
+            parts[k] = share * twist
+        elif largest == k:
+            parts[3] = share * twist
+        else:
+            parts[k] = share * float(rotation[k, largest] + rotation[largest, k])
+    if parts[3] < 0.0:
+        parts = [-part for part in parts]
+    return parts[0], parts[1], parts[2], parts[3]
+
+
 def is_rotation(matrix: Rotation) -> bool:
     """Return whether a 3 x 3 matrix is a rotation, to a part in a hundred."""
     if not np.isfinite(matrix).all():

@@ -8,6 +8,7 @@ import pytest
 from tablerunner.geometry.frame_tree import FrameTree, Link
 from tablerunner.geometry.rotation import (
     is_rotation,
+    quaternion_of_rotation,
     quaternion_of_rpy,
     rotation_of_quaternion,
     rotation_of_rpy,
@@ -59,9 +60,23 @@ def test_rotation_of_rpy_is_that_of_its_quaternion(seed):
     rpy = np.random.default_rng(seed).uniform(-math.pi, math.pi, 3)
     matrix = rotation_of_rpy(*rpy)
     np.testing.assert_allclose(matrix, rotation_of_quaternion(quaternion_of_rpy(*rpy)), atol=1e-12)
+    back = rotation_of_quaternion(quaternion_of_rotation(matrix))
+    np.testing.assert_allclose(back, matrix, atol=1e-12)
     assert is_rotation(matrix)
     assert not is_rotation(-matrix)
     assert not is_rotation(1.1 * matrix)
+
+
+@pytest.mark.parametrize('axis', range(3))
+def test_rotation_by_half_a_turn_has_a_quaternion(axis):
+    """Where w is zero."""
+    rpy = [0.0, 0.0, 0.0]
+    rpy[axis] = math.pi
+    expected = [0.0] * 4
+    expected[axis] = 1.0
+    np.testing.assert_allclose(
+        np.abs(quaternion_of_rotation(rotation_of_rpy(*rpy))), expected, atol=1e-12
+    )
 
 
 def test_rotation_of_rpy_is_that_of_urdf():
