@@ -28,6 +28,7 @@ setup(
     entry_points={
         # Commands that need ROS; they join the tablerunner command of the core.
         'tablerunner.commands': [
+            'doctor = tablerunner_bringup.doctor.command:doctor',
             'demo = tablerunner_bringup.commands:demo',
             'launch = tablerunner_bringup.commands:launch',
             'record = tablerunner_bringup.commands:record',

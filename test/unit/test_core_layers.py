@@ -25,6 +25,7 @@ PARTS = [
     'evaluation',
     'bags',
     'experiments',
+    'doctor',
     'cli',
 ]
 # Beyond the order: the controller works with any estimate, and the simulator must not share a

@@ -1,0 +1,1 @@
+"""`tablerunner doctor`: gathers facts of the machine and of the running robot for the core."""
