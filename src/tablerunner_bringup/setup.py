@@ -22,6 +22,7 @@ setup(
         (f'share/{PACKAGE}/scenarios', sorted(glob('scenarios/*.yaml'))),
         (f'share/{PACKAGE}/dds', sorted(glob('dds/*.xml'))),
         (f'share/{PACKAGE}/rviz', sorted(glob('rviz/*.rviz'))),
+        (f'share/{PACKAGE}/foxglove', sorted(glob('foxglove/*.json'))),
     ],
     install_requires=['setuptools'],
     zip_safe=False,
