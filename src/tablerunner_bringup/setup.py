@@ -29,6 +29,8 @@ setup(
     entry_points={
         # Commands that need ROS; they join the tablerunner command of the core.
         'tablerunner.commands': [
+            'drive = tablerunner_bringup.drive_command:drive',
+            'emulate = tablerunner_bringup.emulator.command:emulate',
             'doctor = tablerunner_bringup.doctor.command:doctor',
             'demo = tablerunner_bringup.commands:demo',
             'launch = tablerunner_bringup.commands:launch',

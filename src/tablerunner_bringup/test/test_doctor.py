@@ -40,7 +40,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         'anchor_ids': list(ANCHORS),
         'anchor_positions': [0.0, 0.0, 2.2, 8.0, 0.0, 2.2, 8.0, 5.0, 2.2, 0.0, 5.0, 2.2],
         'tag_height': 1.1,
-        'port': '/dev/nothing_here',
+        'serial.port': '/dev/nothing_here',
     },
     'odom_node': {
         'left_joints': ['left'],
@@ -183,7 +183,7 @@ def test_doctor_finds_nothing_wrong_with_a_whole_robot(probe: Probe, domain: int
     assert 20.0 < facts.topic('joint_states').rate_hz < 60.0  # 50 on a machine with time to spare
     assert facts.topic('uwb/anchors').count == 1
     assert abs(facts.topic('imu/data').age_s) < 0.1
-    assert facts.parameter('uwb_driver', 'port', '') == '/dev/nothing_here'
+    assert facts.parameter('uwb_driver', 'serial.port', '') == '/dev/nothing_here'
     assert set(facts.anchors) == set(ANCHORS)
 
 

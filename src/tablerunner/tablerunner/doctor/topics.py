@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tablerunner.doctor.facts import Facts, TopicFacts
 from tablerunner.doctor.finding import Finding, error, ok, warning
@@ -156,8 +156,12 @@ def check_nodes(facts: Facts) -> Iterator[Finding]:
 
 def check_topics(facts: Facts) -> Iterator[Finding]:
     """Yield whether each topic that is needed lives."""
+    own = next((item for item in facts.statuses if item.name == 'fusion_node'), None)
+    searching = own is not None and own.values.get('state') in ('waiting', 'aligning')
     for item in expected_topics(facts):
-        yield from _topic(item, facts.topic(item.name))
+        # Before the start is known fusion_node speaks as often as it has something to say.
+        rare = searching and item.node == 'fusion_node'
+        yield from _topic(replace(item, rate_hz=0.0) if rare else item, facts.topic(item.name))
 
 
 def _topic(item: Expected, topic: TopicFacts) -> Iterator[Finding]:

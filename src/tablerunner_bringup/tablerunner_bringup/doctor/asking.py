@@ -28,7 +28,7 @@ ASKED = {
 }
 """Parameters that are asked of each node, beside use_sim_time."""
 
-OPTIONAL = {'uwb_driver': ('port',)}
+OPTIONAL = {'uwb_driver': ('serial.port',)}
 """Those that a node may not have: one unknown name in a question leaves all of it unanswered."""
 
 _FIELDS = {

@@ -111,5 +111,5 @@ def _facts(
         number = int(text) if text.isdigit() else 0
     os.environ['ROS_DOMAIN_ID'] = str(number)
     facts = robot_facts(number, namespace, odom_topic, seconds, progress)
-    told = [str(facts.parameter('uwb_driver', 'port', ''))]
+    told = [str(facts.parameter('uwb_driver', 'serial.port', ''))]
     return facts.with_host(environment, serial_facts([*ports, *told]), localization_only)
