@@ -176,12 +176,13 @@ def replay(bag: BagReader, config: ReplayConfig) -> ReplayResult:
 
 def _names(config: ReplayConfig) -> Names:
     return Names(
-        config.left_joint,
-        config.right_joint,
+        config.left_joints,
+        config.right_joints,
         config.imu_heading,
         config.map_frame,
         config.odom_frame,
         config.base_frame,
+        config.imu_tilt,
     )
 
 

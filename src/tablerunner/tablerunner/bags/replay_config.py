@@ -25,10 +25,17 @@ class ReplayConfig(Config):
     localizer: LocalizerConfig = parameter(
         factory=LocalizerConfig, description='As of fusion_node'
     )
-    left_joint: str = parameter(LEFT_JOINT, description='Joint of the left wheel')
-    right_joint: str = parameter(RIGHT_JOINT, description='Joint of the right wheel')
+    left_joints: tuple[str, ...] = parameter(
+        (LEFT_JOINT,), description='Joints of the left wheels, as of odom_node'
+    )
+    right_joints: tuple[str, ...] = parameter(
+        (RIGHT_JOINT,), description='Joints of the right wheels, as of odom_node'
+    )
     imu_heading: float = parameter(
         0.0, description="Heading of the IMU's frame in base_link", unit='rad'
+    )
+    imu_tilt: tuple[float, float] = parameter(
+        (0.0, 0.0), description="Roll and pitch of the IMU's frame in base_link", unit='rad'
     )
     map_frame: str = parameter('map', description='Frame of anchors and poses; empty: any')
     odom_frame: str = parameter('odom', description='Frame of odom; empty: any')

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from tablerunner.bags.reader import BagReader
+from tablerunner.geometry.rotation import rotation_of_rpy
 from tablerunner.messages.anchors import anchors_from_message
 from tablerunner.messages.exchange import exchange_from_message
 from tablerunner.messages.imu import imu_from_message, magnetic_from_message
@@ -36,32 +37,34 @@ class Names:
 
     Attributes
     ----------
-    left_joint, right_joint : str
-        Joints of the drive wheels in joint_states.
-    imu_heading : float
-        Heading of the IMU's frame in base_link [rad].
+    left_joints, right_joints : tuple of str
+        Joints of the drive wheels in joint_states, as many on the left as on the right.
+    imu_heading, imu_tilt : float and tuple of float
+        Heading, and roll and pitch, of the IMU's frame in base_link [rad].
     map_frame, odom_frame, base_frame : str
         Frames of poses and anchors, of odometry, and of the robot.
     """
 
-    left_joint: str = LEFT_JOINT
-    right_joint: str = RIGHT_JOINT
+    left_joints: tuple[str, ...] = (LEFT_JOINT,)
+    right_joints: tuple[str, ...] = (RIGHT_JOINT,)
     imu_heading: float = 0.0
     map_frame: str = ''
     odom_frame: str = ''
     base_frame: str = ''
+    imu_tilt: tuple[float, float] = (0.0, 0.0)
 
 
 def converters(names: Names | None = None) -> dict[str, Converter]:
     """Return how the messages of each contract topic become records, by relative name."""
     use = names or Names()
-    left, right, heading = use.left_joint, use.right_joint, use.imu_heading
+    left, right, heading = use.left_joints, use.right_joints, use.imu_heading
+    mount = rotation_of_rpy(*use.imu_tilt, heading)
     table: dict[str, Converter] = {
         'uwb/exchanges': exchange_from_message,
         'uwb/ranges': range_from_message,
         'uwb/anchors': lambda message: anchors_from_message(message, use.map_frame),
         'joint_states': lambda message: wheels_from_message(message, left, right),
-        'imu/data': lambda message: imu_from_message(message, heading),
+        'imu/data': lambda message: imu_from_message(message, mount=mount),
         'imu/mag': lambda message: magnetic_from_message(message, heading),
         'innovations': innovation_from_message,
         'ground_truth': truth_from_message,

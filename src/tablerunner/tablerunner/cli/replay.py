@@ -32,6 +32,12 @@ def replay(
             metavar='F', help='Robot and anchors; scenario.yaml in or beside BAG if not given.'
         ),
     ] = None,
+    params: Annotated[
+        Optional[list[Path]],
+        typer.Option(
+            metavar='FILE', help="ROS parameter file of the robot's nodes; may be given often."
+        ),
+    ] = None,
     json_file: Annotated[
         Optional[Path], typer.Option('--json', metavar='FILE', help='Write the figures to a file.')
     ] = None,
@@ -82,7 +88,7 @@ def replay(
     with Progress() as progress:
         for name in names:
             config = changed(
-                replay_config(room, name, start, namespace),
+                replay_config(room, name, start, namespace, tuple(params or ())),
                 fixes=plot_file is not None,
                 keep=smooth and name in SMOOTHED,
             )

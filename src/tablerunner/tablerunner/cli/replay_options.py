@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from tablerunner.bags.node_parameters import with_node_parameters
 from tablerunner.bags.replay_config import ReplayConfig
 from tablerunner.errors import ConfigError
 from tablerunner.estimation import ESTIMATORS
@@ -32,7 +34,11 @@ def find_scenario_file(bag: Path, given: Path | None) -> Path | None:
 
 
 def replay_config(
-    scenario: Scenario | None, estimator: str, start: str, namespace: str
+    scenario: Scenario | None,
+    estimator: str,
+    start: str,
+    namespace: str,
+    parameter_files: Sequence[Path] = (),
 ) -> ReplayConfig:
     """Return the settings of a replay.
 
@@ -46,10 +52,14 @@ def replay_config(
         ``X,Y,YAW`` in m and rad, or empty to find the start from the measurements.
     namespace : str
         Namespace of the robot in the bag.
+    parameter_files : sequence of Path
+        ROS parameter files of the robot's nodes, over the scenario.
     """
     config = ReplayConfig() if scenario is None else ReplayConfig.from_scenario(scenario)
+    config = with_node_parameters(config, parameter_files)
     try:
-        localizer = replace(config.localizer, estimator=estimator, initial_pose=parse_start(start))
+        pose = parse_start(start) or config.localizer.initial_pose
+        localizer = replace(config.localizer, estimator=estimator, initial_pose=pose)
     except ConfigError as error:
         raise error.located('options') from None
     return replace(config, localizer=localizer, namespace=namespace)

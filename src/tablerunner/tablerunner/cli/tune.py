@@ -39,6 +39,12 @@ def tune(
         typer.Option(metavar='X,Y,YAW', help='Pose at the start; found by driving if not given.'),
     ] = '',
     namespace: Annotated[str, typer.Option(help='Namespace of the robot in the bag.')] = '',
+    params: Annotated[
+        Optional[list[Path]],
+        typer.Option(
+            metavar='FILE', help="ROS parameter file of the robot's nodes; may be given often."
+        ),
+    ] = None,
 ) -> None:
     """Find the noise under which the ranges of a bag are most likely; no truth is needed.
 
@@ -64,7 +70,8 @@ def tune(
         expected = 'a name that ends with .yaml, of a file that does not exist yet'
         raise ConfigError('--out', str(output), expected, 'options')
     begun = time.perf_counter()
-    config = replay_config(find_scenario(bag, scenario), estimator, start, namespace)
+    room = find_scenario(bag, scenario)
+    config = replay_config(room, estimator, start, namespace, tuple(params or ()))
     drives, anchors = _drives(bag, config)
     x, y, z = config.localizer.tag_position
     make = partial(ESTIMATORS[estimator], anchors=anchors, lever_arm=(x, y, z))
