@@ -25,6 +25,10 @@ PAGE = Path(__file__).parents[2] / 'docs' / 'first-robot.md'
 LIMIT_S = 240.0
 """Of one step; ends a hang."""
 
+LOST_LIMIT_S = 1.0
+"""Of real time. The robot is late by a fifth of a second before any is lost at all, and stands for
+stale poses and commands long before that: nothing can be said of a robot then."""
+
 _MARK = re.compile(r'<!-- (run|stop)(?:: (.*?))? -->')
 
 
@@ -33,8 +37,8 @@ class Step:
     """One marked block of the page.
 
     ``<!-- run: exit N expect "REGEX" -->`` before a block runs it and looks at exit code and
-    output; with ``background NAME until "WORDS"`` it goes on running, until
-    ``<!-- stop: NAME -->`` or the end of the page.
+    output; ``tries N``: a busy machine may need more than one. With ``background NAME until
+    "WORDS"`` it goes on running, until ``<!-- stop: NAME -->`` or the end of the page.
     """
 
     line: int
@@ -43,6 +47,7 @@ class Step:
     expect: str = ''
     background: str = ''
     until: str = ''
+    tries: int = 1
     stop: str = ''
 
 
@@ -58,7 +63,7 @@ def steps_of(text: str) -> list[Step]:
         if kind == 'stop':
             found.append(Step(number, stop=words))
             continue
-        options = dict(re.findall(r'(exit|expect|background|until) ("[^"]*"|\S+)', words))
+        options = dict(re.findall(r'(exit|expect|background|until|tries) ("[^"]*"|\S+)', words))
         found.append(
             Step(
                 number,
@@ -67,6 +72,7 @@ def steps_of(text: str) -> list[Step]:
                 options.get('expect', '').strip('"'),
                 options.get('background', ''),
                 options.get('until', '').strip('"'),
+                int(options.get('tries', 1)),
             )
         )
     return found
@@ -101,6 +107,25 @@ class Day:
             self._run(step)
 
     def _run(self, step: Step) -> None:
+        for _ in range(step.tries):
+            fault = self._tried(step)
+            if not fault:
+                return
+            print(fault)
+        if self.lost_s > LOST_LIMIT_S:
+            pytest.skip(f'no real time on this machine now: {self.lost_s:.0f} s lost; {fault}')
+        raise AssertionError(fault)
+
+    @property
+    def lost_s(self) -> float:
+        """Real time that the emulated robot could not keep up with."""
+        if 'emulate' not in self._running:
+            return 0.0
+        text = self._running['emulate'][1].read_text('utf-8', 'replace')
+        return float((re.findall(r'([\d.]+) s lost', text) or ['0'])[-1])
+
+    def _tried(self, step: Step) -> str:
+        """Return how a step failed; empty when it did not."""
         done = subprocess.run(
             ['bash', '-e', '-c', step.script],
             cwd=self._folder,
@@ -113,8 +138,9 @@ class Day:
         )
         said = done.stdout.decode('utf-8', 'replace')
         where = f'{PAGE.name}:{step.line}\n{step.script}\n{said}\n{self.said()}'
-        assert done.returncode == step.exit_code, f'exit code {done.returncode}: {where}'
-        assert re.search(step.expect, said), f'{step.expect!r} not found: {where}'
+        if done.returncode != step.exit_code:
+            return f'exit code {done.returncode}: {where}'
+        return '' if re.search(step.expect, said) else f'{step.expect!r} not found: {where}'
 
     def _start(self, step: Step) -> None:
         log = self._folder / f'{step.background}.log'

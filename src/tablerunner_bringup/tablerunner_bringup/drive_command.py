@@ -15,19 +15,28 @@ def drive(
     turn: Annotated[
         float, typer.Option(help='Turn rate [rad/s], left positive, at most 1.')
     ] = 0.0,
-    seconds: Annotated[float, typer.Option(min=0.0, max=120.0, help='For how long.')] = 2.0,
+    distance: Annotated[
+        Optional[float], typer.Option(min=0.0, help='Until odometry has come so far [m].')
+    ] = None,
+    angle: Annotated[
+        Optional[float], typer.Option(min=0.0, help='Until it has turned so far [degrees].')
+    ] = None,
+    seconds: Annotated[
+        Optional[float],
+        typer.Option(min=0.0, max=300.0, help='At most so long; 2, or 60 with one of those.'),
+    ] = None,
     topic: Annotated[str, typer.Option(help='Where the base or safety_stop listens.')] = 'cmd_vel',
     namespace: Annotated[str, typer.Option(help='Namespace of the robot.')] = '',
     domain: Annotated[
         Optional[int], typer.Option(help='ROS domain; that of ROS_DOMAIN_ID when not given.')
     ] = None,
 ) -> None:
-    """Drive by hand, a velocity for a while, and say what odometry makes of it.
+    """Drive by hand, for a time or a distance, and say what odometry makes of it.
 
     Nothing watches the way: wheels off the floor first, then a free one. Twist or TwistStamped, as
     the listener wants. It does not speak while another node drives.
 
-    Example: tablerunner drive --speed 0.2 --seconds 5
+    Example: tablerunner drive --speed 0.2 --distance 1
     """
     from tablerunner.types import Velocity
     from tablerunner_bringup.hand_driving import DriveOptions
@@ -36,7 +45,17 @@ def drive(
     for name, value, most in (('--speed', speed, 0.5), ('--turn', turn, 1.0)):
         if not abs(value) <= most:
             raise ConfigError(name, value, f'a number from {-most:g} to {most:g}', 'options')
-    options = DriveOptions(Velocity(speed, turn), seconds, topic, namespace.strip('/'), domain)
+    if seconds is None:
+        seconds = 2.0 if distance is None and angle is None else 60.0
+    options = DriveOptions(
+        Velocity(speed, turn),
+        seconds,
+        math.inf if distance is None else distance,
+        math.inf if angle is None else math.radians(angle),
+        topic,
+        namespace.strip('/'),
+        domain,
+    )
     driven = run(options, Progress())
     if math.isnan(driven.forward_m):
         typer.echo('odometry is silent: see tablerunner doctor')

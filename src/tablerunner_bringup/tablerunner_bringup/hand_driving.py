@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from rclpy.node import Node
 
 from tablerunner.cli.console import Progress
 from tablerunner.errors import TablerunnerError
+from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
 from tablerunner.messages.odometry import odometry_from_message
 from tablerunner.types import Refusal, Velocity
@@ -26,6 +28,7 @@ STANDING = Velocity(0.0, 0.0)
 _FIND_S = 10.0
 _OTHERS_S = 1.0
 _NAMES_S = 0.3
+_ODOMETRY_S = 3.0
 _SETTLE_S = 1.0
 _STAMPED = 'geometry_msgs/msg/TwistStamped'
 
@@ -36,10 +39,16 @@ class NobodyDrivesError(TablerunnerError):
 
 @dataclass(frozen=True)
 class DriveOptions:
-    """A velocity, for how long, and to whom."""
+    """A velocity, until when, and to whom.
+
+    It ends after `seconds`, or when odometry has come as far as one of `distance_m` and
+    `angle_rad` says; infinite: that does not end it.
+    """
 
     velocity: Velocity
     seconds: float
+    distance_m: float = math.inf
+    angle_rad: float = math.inf
     topic: str = 'cmd_vel'
     namespace: str = ''
     domain: int | None = None
@@ -52,6 +61,34 @@ class Driven:
     forward_m: float = math.nan
     left_m: float = math.nan
     turn_rad: float = math.nan
+
+
+class Log:
+    """Adds up what odometry says."""
+
+    def __init__(self) -> None:
+        self._start: Pose2 | None = None
+        self._last: Pose2 | None = None
+        self.way_m = 0.0
+        self.turn_rad = 0.0
+
+    def take(self, pose: Pose2 | None) -> None:
+        """Take the newest pose in odom, if there is one."""
+        if pose is None:
+            return
+        if self._last is not None:
+            self.way_m += pose.distance_to(self._last)
+            self.turn_rad += difference(pose.heading, self._last.heading)
+        self._start = self._start or pose
+        self._last = pose
+
+    @property
+    def driven(self) -> Driven:
+        """From the first pose to the last."""
+        if self._start is None or self._last is None:
+            return Driven()
+        moved = self._start.inverse() @ self._last
+        return Driven(moved.x, moved.y, self.turn_rad)
 
 
 def drive(options: DriveOptions, progress: Progress) -> Driven:
@@ -71,29 +108,30 @@ def drive(options: DriveOptions, progress: Progress) -> Driven:
         kind = TwistStamped if stamped else Twist
         publisher = node.create_publisher(kind, options.topic, qos_for('cmd_vel'))
         odometry = Newest(node, Odometry, 'odom', qos_for('odom', subscriber=True))
-        _wait(lambda: publisher.get_subscription_count() and odometry.poll(), 2.0)
-        start, turned = _pose(odometry), 0.0
-        last = start
+        _wait(lambda: publisher.get_subscription_count() and odometry.poll(), _ODOMETRY_S)
+        log = Log()
+        log.take(_pose(odometry))
 
-        def send(velocity: Velocity, duration_s: float) -> None:
-            nonlocal last, turned
+        def send(velocity: Velocity, duration_s: float, done: Callable[[], bool]) -> None:
             end = time.monotonic() + duration_s
-            while time.monotonic() < end and not (interrupts.asked and velocity != STANDING):
+            while time.monotonic() < end and not done():
                 publisher.publish(_message(velocity, stamped))
                 time.sleep(PERIOD_S)
                 odometry.poll()
-                pose = _pose(odometry)
-                if last is not None and pose is not None:
-                    turned += math.remainder(pose.heading - last.heading, math.tau)
-                last = pose or last
-                progress.show(f'{max(end - time.monotonic(), 0.0):.1f} s more')
+                log.take(_pose(odometry))
+                progress.show(f'{log.way_m:.2f} m, {math.degrees(log.turn_rad):.0f} degrees')
 
-        send(options.velocity, options.seconds)
-        send(STANDING, _SETTLE_S)
-        if start is None or last is None:
-            return Driven()
-        moved = start.inverse() @ last
-        return Driven(moved.x, moved.y, turned)
+        send(
+            options.velocity,
+            options.seconds,
+            lambda: (
+                interrupts.asked
+                or log.way_m >= options.distance_m
+                or abs(log.turn_rad) >= options.angle_rad
+            ),
+        )
+        send(STANDING, _SETTLE_S, lambda: False)
+        return log.driven
 
 
 def _listener(node: Node, topic: str) -> bool:

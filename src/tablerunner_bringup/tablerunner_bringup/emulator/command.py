@@ -57,3 +57,5 @@ def emulate(
     )
     told = run(options, Progress())
     typer.echo(f'{told.commands} commands obeyed, {told.touches} touches')
+    if told.lost_s:
+        typer.echo(f'this machine was too slow: {told.lost_s:.1f} s of real time are lost')

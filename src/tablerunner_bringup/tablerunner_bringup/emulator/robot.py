@@ -22,6 +22,7 @@ from tablerunner.types import (
     UltrasonicSample,
     Velocity,
     WheelSample,
+    seconds,
 )
 from tablerunner.uwb.ranging import distance, double_sided, intervals
 from tablerunner_bringup.emulator.dwm1001 import Dwm1001
@@ -53,11 +54,12 @@ def address_of(anchor_id: str, index: int) -> str:
 
 @dataclass
 class Told:
-    """What the robot has done so far, for the terminal."""
+    """What the robot has done so far, for the terminal; `lost_s` is real time not kept up with."""
 
     touches: int = 0
     commands: int = 0
     refused: int = 0
+    lost_s: float = 0.0
 
 
 class EmulatedRobot:
@@ -123,6 +125,7 @@ class EmulatedRobot:
         due = (time.time_ns() - self._offset_ns - self._sim.now_ns) // STEP_NS
         if due > MOST_STEPS:
             self._offset_ns += (due - MOST_STEPS) * STEP_NS
+            self.told.lost_s += seconds((due - MOST_STEPS) * STEP_NS)
         for _ in range(min(due, MOST_STEPS)):
             for sample in self._sim.step(command):
                 self._publish(sample)

@@ -73,7 +73,9 @@ def _places(scenario: Scenario) -> dict[str, tuple[float, float, float]]:
 def _situation(robot: EmulatedRobot) -> str:
     truth = robot.truth
     pose = truth.pose
+    lost_s = robot.told.lost_s
+    lost = f', {lost_s:.1f} s lost' if lost_s else ''
     return (
         f'really at {pose.x:5.2f} {pose.y:5.2f} m {math.degrees(pose.heading):4.0f} deg, '
-        f'{truth.linear_m_s:4.2f} m/s, {robot.told.commands} commands'
+        f'{truth.linear_m_s:4.2f} m/s, {robot.told.commands} commands{lost}'
     )
