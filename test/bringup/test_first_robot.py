@@ -25,7 +25,7 @@ PAGE = Path(__file__).parents[2] / 'docs' / 'first-robot.md'
 LIMIT_S = 240.0
 """Of one step; ends a hang."""
 
-LOST_LIMIT_S = 1.0
+LOST_LIMIT_S = 2.0
 """Of real time. The robot is late by a fifth of a second before any is lost at all, and stands for
 stale poses and commands long before that: nothing can be said of a robot then."""
 

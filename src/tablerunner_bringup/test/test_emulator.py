@@ -15,11 +15,14 @@ from sensor_msgs.msg import Imu, JointState
 
 from tablerunner.cli.main import main
 from tablerunner.errors import ConfigError
+from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import load_scenario
 from tablerunner.uwb.protocol import Dwm1001Shell
+from tablerunner_bringup.doctor.host import serial_facts
 from tablerunner_bringup.emulator.dwm1001 import PROMPT, Dwm1001
 from tablerunner_bringup.emulator.robot import EmulatedRobot, address_of
 from tablerunner_bringup.emulator.wire import Wire
+from tablerunner_bringup.hand_driving import Log
 from tablerunner_bringup.polling import bare_node
 from tablerunner_ros.conversions.stamp import stamp_from_message
 from tablerunner_ros.qos import qos_for
@@ -100,7 +103,14 @@ def test_wire_is_a_serial_port_while_it_lasts(tmp_path: Path) -> None:
         assert wire.read() == b'lec\r'
         for _ in range(1000):
             wire.write(bytes(1000))  # nobody reads: lost, not waited for
+        assert len(serial_facts([str(path)])[0].holders) == 1  # who opened it, twice not
         os.close(port)
+        assert wire.read() == b''
+        wire.write(b'unheard')
+        again = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        os.write(again, b'si\r')
+        assert wire.read() == b'si\r'
+        os.close(again)
     assert not path.exists()
     path.write_text('mine')
     with pytest.raises(ConfigError, match='a path at which nothing is'), Wire(path):
@@ -148,6 +158,21 @@ def test_drive_without_a_listener_or_beside_another_driver_is_refused(
     assert main(command) == 1
     assert 'probe drives on /cmd_vel already' in capsys.readouterr().err
     assert heard == []
+
+
+def test_log_adds_up_way_and_turns_over_the_end_of_the_circle() -> None:
+    """A circle and a half to the left with radius 1 m, from a pose that is none."""
+    log = Log()
+    assert math.isnan(log.driven.forward_m)
+    start = Pose2(3.0, -2.0, 2.5)
+    steps = 300
+    for step in range(steps + 1):
+        angle = 3.0 * math.pi * step / steps
+        log.take(start @ Pose2(math.sin(angle), 1.0 - math.cos(angle), angle))
+        log.take(None)  # silent meanwhile
+    assert log.way_m == pytest.approx(3.0 * math.pi, rel=1e-3)
+    assert log.turn_rad == pytest.approx(3.0 * math.pi)
+    assert (log.driven.forward_m, log.driven.left_m) == pytest.approx((0.0, 2.0), abs=1e-9)
 
 
 def test_drive_too_fast_is_bad_input(capsys) -> None:

@@ -10,6 +10,7 @@ from tf2_msgs.msg import TFMessage
 
 from odom_node.frames_params import SensorFramesConfig
 from sim_bridge.convert import mounts_to_transforms
+from tablerunner.cli.main import main
 from tablerunner.messages.transforms import links_from_message
 from tablerunner.scenario import load_scenario
 from tablerunner_bringup import parameters
@@ -72,3 +73,16 @@ def test_sensor_frames_are_those_that_the_simulation_publishes():
         assert (one.parent, one.child) == (other.parent, other.child)
         np.testing.assert_allclose(one.translation, other.translation, atol=1e-12)
         np.testing.assert_allclose(one.rotation, other.rotation, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--localization-only', '--deliver', 'table_1'], 'nobody drives then'),
+        (['--remap', 'odom=/base/odom'], 'expected OLD:=NEW'),
+    ],
+)
+def test_launch_options_that_contradict_are_bad_input(capsys, arguments, words):
+    """Before anything is started."""
+    assert main(['launch', *arguments]) == 2
+    assert words in capsys.readouterr().err

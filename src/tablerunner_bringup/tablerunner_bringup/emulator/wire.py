@@ -24,22 +24,24 @@ class Wire:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._end = self._other = -1
+        self._end = -1
 
     def __enter__(self) -> Wire:
         if self.path.exists() and not self.path.is_symlink():
             raise ConfigError('--port', str(self.path), 'a path at which nothing is')
-        self._end, self._other = os.openpty()  # the other end is kept: else a reader sees its end
+        self._end, other = os.openpty()
         tty.setraw(self._end)
         os.set_blocking(self._end, False)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.path.unlink(missing_ok=True)
-            self.path.symlink_to(os.ttyname(self._other))
+            self.path.symlink_to(os.ttyname(other))
         except OSError as error:
             self.__exit__(None, None, None)
             expected = f'a path that can be made ({error.strerror})'
             raise ConfigError('--port', str(self.path), expected) from error
+        finally:
+            os.close(other)  # it is for whoever opens the path
         return self
 
     def __exit__(
@@ -50,19 +52,18 @@ class Wire:
     ) -> None:
         if self.path.is_symlink():
             self.path.unlink(missing_ok=True)
-        for end in (self._end, self._other):
-            with contextlib.suppress(OSError):
-                os.close(end)
+        with contextlib.suppress(OSError):
+            os.close(self._end)
 
     def write(self, data: bytes) -> None:
         """Send bytes; where nobody reads, what does not fit is lost, as on a cable."""
         if data:
-            with contextlib.suppress(BlockingIOError):
+            with contextlib.suppress(OSError):
                 os.write(self._end, data)
 
     def read(self) -> bytes:
         """Return what has been sent to the device since the last call."""
         try:
             return os.read(self._end, _MOST)
-        except BlockingIOError:
+        except OSError:  # nothing there, or nobody has the port open
             return b''
