@@ -198,7 +198,7 @@ def day(tmp_path: Path, domain: int) -> Iterator[Day]:
 def test_first_robot_from_the_boxes_to_a_meal(day: Day) -> None:
     """Every command of the page, on a robot whose devices are emulated in real time."""
     steps = steps_of(PAGE.read_text(encoding='utf-8'))
-    assert len(steps) >= 12
+    assert len(steps) >= 16
     for step in steps:
         begun = time.monotonic()
         day.do(step)
