@@ -24,7 +24,7 @@ class BlockadeConfig(Config):
         5, description='How often the robot was held up at a place', low=1, dynamic=True
     )
     span: float = parameter(
-        100.0,
+        180.0,
         description='From the first time to the last',
         unit='s',
         low=0.0,
@@ -38,7 +38,7 @@ class BlockadeConfig(Config):
         dynamic=True,
     )
     memory: float = parameter(
-        240.0,
+        300.0,
         description='A place where nothing held the robot up for longer is tried again',
         unit='s',
         above=0.0,

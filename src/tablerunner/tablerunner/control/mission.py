@@ -9,34 +9,27 @@ from __future__ import annotations
 from tablerunner.control.alignment import AlignmentDrive
 from tablerunner.control.blockades import BlockadeConfig
 from tablerunner.control.caution import CautionConfig
-from tablerunner.control.controller import Controller, Drive
+from tablerunner.control.controller import Controller
 from tablerunner.control.destination import Destination, MissionState, MissionStatus, Situation
-from tablerunner.control.floor_map import Disc
 from tablerunner.control.fuzzy.readings import Readings
 from tablerunner.control.hand_over import HandOver
-from tablerunner.control.leg import Leg
-from tablerunner.control.look_around import LookAround
+from tablerunner.control.leg_drive import LegDrive, LegPhase
 from tablerunner.control.lost_watch import LostWatch
-from tablerunner.control.marks import disc_ahead
 from tablerunner.control.mission_config import MissionConfig
-from tablerunner.control.path import Path
 from tablerunner.control.planner import Planner
-from tablerunner.control.progress import ProgressWatch
 from tablerunner.control.surroundings import Surroundings
 from tablerunner.control.tour import Tour, check_stops
-from tablerunner.control.way_finder import WayFinder, patience
-from tablerunner.errors import MissionError, NoWayError, PlanningError
-from tablerunner.geometry.pose import Pose2
-from tablerunner.types import Velocity, nanoseconds, seconds
+from tablerunner.control.way_finder import WayFinder
+from tablerunner.errors import MissionError
+from tablerunner.types import Velocity, seconds
 
-_PLAN_RETRY_S = 2.0
-_PLAN_TRIES = 4
 _LONGEST_STEP_S = 0.5
-_NEAR_M = 0.3
-_LOOK_PAUSE_S = 12.0
-_RETREAT_S = 20.0
-_ASIDE_S = 4.0
-_RETREAT_AGAIN_S = 30.0
+_STATES = {
+    LegPhase.PLANNING: MissionState.PLANNING,
+    LegPhase.DRIVING: MissionState.DRIVING,
+    LegPhase.BLOCKED: MissionState.BLOCKED,
+    LegPhase.HELD: MissionState.HELD,
+}
 
 
 class Mission:
@@ -81,9 +74,7 @@ class Mission:
         self._last_stamp = 0
         self._lost = LostWatch()
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
-        self._progress = ProgressWatch()
-        self._look = LookAround(_LOOK_PAUSE_S)
-        self._leg = Leg(config.replan_after)
+        self._drive = LegDrive(config, planner, controller, self._ways)
         self._saved_s = 0.0  # of the time that the stops so far were given
 
     @property
@@ -101,6 +92,7 @@ class Mission:
         """Use other settings from now on; a mission under way goes on."""
         self.config = config
         self.planner = planner
+        self._drive.config, self._drive.planner = config, planner
         self._ways.configure(planner, caution, blockades)
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
 
@@ -184,7 +176,7 @@ class Mission:
         if self._paused:
             raise MissionError('paused already')
         self._paused = True
-        self._leg.path = None  # the robot may be moved meanwhile
+        self._drive.interrupt()  # the robot may be moved meanwhile
         self._events.append('paused')
 
     def resume(self) -> None:
@@ -198,7 +190,7 @@ class Mission:
         if not self._paused:
             raise MissionError('nothing to resume: not paused')
         self._paused = False
-        self._progress.restart()
+        self._drive.rest()
         self._lost.restart()
         if self._stay is None:
             self._state = MissionState.PLANNING
@@ -255,8 +247,8 @@ class Mission:
             MissionState.PAUSED if self._paused else self._state,
             tour.index,
             '' if goal is None else goal.name,
-            self._leg.distance_left,
-            self._leg.path if self.is_busy else None,
+            self._drive.distance_left,
+            self._drive.path if self.is_busy else None,
             tour.reached,
             tour.missed,
             tour.unconfirmed,
@@ -267,49 +259,34 @@ class Mission:
     def _advance(self, situation: Situation, elapsed: float) -> Velocity | None:
         """Do one step of a mission under way; None: stand still."""
         dt = min(elapsed, _LONGEST_STEP_S)
-        stop, leg = self._tour.goal, self._leg
+        stop = self._tour.goal
         if self._stay is not None:
             self._state = self._stay.state
             if self._stay.step(elapsed):
                 self._leave()
             return None
-        pose = situation.pose
+        pose, drive = situation.pose, self._drive
         localised, velocity = self._localise(situation)
-        leg.taken_s += elapsed if leg.begun else 0.0
+        drive.wait(elapsed)
         if not localised or pose is None or stop is None:
-            self._progress.restart()
+            drive.rest()
             return velocity
-        leg.begun = True
-        limit = self.config.stop_limit + self._saved_s
-        if leg.taken_s > limit:
-            self._miss(f'not reached within {limit:.0f} s')
-            return None
-        if leg.path is None and not self._plan(situation, pose, stop):
-            return None
-        if self._ways.is_approached(situation.stamp):
-            return None
-        if leg.retreat_until:
-            return self._make_way(situation, pose, dt)
-        self._look_ahead(situation, pose, stop)
-        drive = self.controller.step(pose, dt)
-        leg.distance_left = drive.distance_left
-        if drive.arrived:
+        step = drive.step(situation, pose, stop, dt, self.config.stop_limit + self._saved_s)
+        self._events.extend(drive.events)
+        drive.events.clear()
+        self._state = self._driving_state
+        if step.arrived:
             self._arrive(stop)
-            return None
-        if drive.cross_track > self.config.off_path:
-            self._events.append(f'{drive.cross_track:.1f} m off the path: planning anew')
-            leg.path = None
-            return None
-        if situation.held:
-            # Not blocked: nobody can be waited for or driven around. The time limit goes on.
-            self._progress.restart()
-            self._state = MissionState.HELD
-        elif not self._watch(situation, pose, stop, drive, dt):
-            return None
-        elif self._state is MissionState.BLOCKED:
-            look = self._look.step(situation.stamp, situation.blocked and leg.stuck)
-            return drive.velocity if look is None else look
-        return drive.velocity
+        elif step.missed:
+            self._miss(step.missed)
+        return step.velocity
+
+    @property
+    def _driving_state(self) -> MissionState:
+        phase = self._drive.phase
+        if phase is LegPhase.DRIVING and self._tour.is_returning:
+            return MissionState.RETURNING
+        return _STATES[phase]
 
     def _localise(self, situation: Situation) -> tuple[bool, Velocity | None]:
         """Return whether the pose can be driven on, and what to drive if it cannot."""
@@ -319,8 +296,7 @@ class Mission:
             self._events.append(event)
         if not lost.is_lost:
             if event:
-                self._leg.path = None
-                self._state = MissionState.PLANNING
+                self._drive.interrupt()
             return True, None
         if lost.lost_s(situation.stamp) > config.localise_limit:
             self._end(MissionState.FAILED, f'not localised for {config.localise_limit:.0f} s')
@@ -330,159 +306,10 @@ class Mission:
             return False, None
         return False, self._align.step(situation.stamp, situation.blocked)
 
-    def _plan(self, situation: Situation, pose: Pose2, stop: Destination) -> bool:
-        """Make a path to the stop; False: there is none yet, or the stop was missed."""
-        self._state = MissionState.PLANNING
-        if situation.stamp < self._leg.plan_again:
-            return False
-        try:
-            path = self._ways.way(pose, stop, situation.stamp)
-        except NoWayError as error:
-            self._miss(str(error))
-            return False
-        except PlanningError as error:
-            self._leg.plan_tries += 1
-            if self._leg.plan_tries >= _PLAN_TRIES:
-                self._miss(str(error))
-            else:
-                self._leg.plan_again = situation.stamp + nanoseconds(_PLAN_RETRY_S)
-                self._events.append(f'{error}: trying again')
-            return False
-        self._leg.plan_tries = 0
-        self._follow(path)
-        self._events.append(f'{path.length:.1f} m to {stop.name}')
-        return True
-
-    def _look_ahead(self, situation: Situation, pose: Pose2, stop: Destination) -> None:
-        """Take another way where something was found on this one."""
-        leg = self._leg
-        if leg.path is None:
-            return
-        path = self._ways.other_way(situation.stamp, pose, stop, leg.path, leg.distance_left)
-        if path is None:
-            return
-        self._events.append(f'something in the way: round it in {path.length:.1f} m')
-        leg.path, leg.distance_left = path, path.length
-        self.controller.follow(path)
-        if self._ways.has_moved(pose):
-            self._progress.restart()
-
-    def _follow(self, path: Path) -> None:
-        self._leg.path = path
-        self._leg.distance_left = path.length
-        self._ways.begin()
-        self.controller.follow(path)
-        self._progress.restart()
-        self._state = self._moving
-
-    @property
-    def _moving(self) -> MissionState:
-        return MissionState.RETURNING if self._tour.is_returning else MissionState.DRIVING
-
-    def _watch(
-        self, situation: Situation, pose: Pose2, stop: Destination, drive: Drive, dt: float
-    ) -> bool:
-        """Look whether the robot gets on; False: the stop was given up, or is near enough."""
-        config = self.config
-        stuck_s = self._progress.stuck_s(
-            situation.stamp,
-            pose,
-            drive.distance_left,
-            situation.blocked or self._state is MissionState.BLOCKED,
-        )
-        self._leg.stuck = stuck_s >= config.look_after
-        if stuck_s < config.blocked_after:
-            self._state = self._moving
-            self._leg.replan_at = config.replan_after
-            return True
-        if self._state is not MissionState.BLOCKED:
-            self._events.append(f'blocked on the way to {stop.name}')
-        self._state = MissionState.BLOCKED
-        self._leg.blocked_s += dt
-        if self._leg.blocked_s > config.give_up_after:
-            self._miss(f'way blocked for {self._leg.blocked_s:.0f} s')
-            return False
-        if stuck_s >= self._leg.replan_at:
-            off = pose.distance_to(stop.pose)
-            if off <= _NEAR_M:  # a pose that is off by this much lets it come no nearer
-                self._events.append(f'as near to {stop.name} as it gets: {off:.2f} m')
-                self._arrive(stop)
-                return False
-            self._leg.replan_at = stuck_s + config.replan_after
-            self._around(situation, pose, stop, stuck_s)
-        return True
-
-    def _around(
-        self, situation: Situation, pose: Pose2, stop: Destination, stuck_s: float
-    ) -> None:
-        """Look for a way around what is in the way; keep waiting before it if there is none.
-
-        For a long way round it is worth to wait a little: people move on. The oftener something
-        was met here, the less.
-        """
-        left = self._leg.distance_left
-        mark = disc_ahead(situation, pose, self.planner.footprint_radius)
-        times = self._ways.meet(mark, situation.stamp, self.config.mark_time)
-        try:
-            path = self._ways.way_around(pose, stop, situation.stamp)
-        except PlanningError as error:
-            if not self._retreats(situation, pose, mark):
-                self._wait_before(situation, pose, stop, error)
-            return
-        if stuck_s < self.config.replan_after + patience(path.length - left) / times:
-            self._events.append(f'a way around of {path.length:.1f} m is long: waiting')
-            return
-        self._follow(path)
-        self._state = MissionState.BLOCKED
-        self._events.append(f'a way around of {path.length:.1f} m')
-
-    def _retreats(self, situation: Situation, pose: Pose2, mark: Disc) -> bool:
-        """Begin to make way for who stands in the way; False: it cannot, or has just done so."""
-        leg = self._leg
-        if leg.path is None or situation.stamp < leg.retreat_again:
-            return False
-        path = self._ways.refuge(pose, mark, leg.path, leg.distance_left)
-        if path is None:
-            return False
-        self._follow(path)
-        self._state = MissionState.BLOCKED
-        leg.retreat_until = situation.stamp + nanoseconds(_RETREAT_S)
-        leg.retreat_again = situation.stamp + nanoseconds(_RETREAT_AGAIN_S)
-        leg.retreated = False
-        self._events.append(f'making way: {path.length:.1f} m aside')
-        return True
-
-    def _make_way(self, situation: Situation, pose: Pose2, dt: float) -> Velocity | None:
-        """Drive out of somebody's way, stand there for a while, then plan anew."""
-        leg = self._leg
-        if situation.stamp >= leg.retreat_until:
-            leg.retreat_until, leg.path = 0, None
-            return None
-        if leg.retreated:
-            return None
-        drive = self.controller.step(pose, dt)
-        if drive.arrived:
-            leg.retreated = True
-            leg.retreat_until = situation.stamp + nanoseconds(_ASIDE_S)
-        return drive.velocity
-
-    def _wait_before(
-        self, situation: Situation, pose: Pose2, stop: Destination, error: PlanningError
-    ) -> None:
-        """Keep waiting before what is in the way; give the stop up if it is there to stay."""
-        try:
-            self._ways.lasting_way(pose, stop, situation.stamp)
-        except NoWayError as blocked:
-            self._miss(str(blocked))
-        except PlanningError:
-            pass
-        else:
-            self._events.append(f'no way around ({error}): waiting')
-
     def _arrive(self, stop: Destination) -> None:
         self._tour = self._tour.arrive()
         self._events.append(f'reached {stop.name}')
-        self._leg.distance_left = 0.0
+        self._drive.arrive()
         self._stay = HandOver(stop)
         self._state = self._stay.state
         if self._stay.step(0.0):
@@ -511,11 +338,9 @@ class Mission:
 
     def _begin_leg(self) -> None:
         """Forget what concerned one stop only."""
-        self._ways.forget()
-        self._saved_s += self.config.stop_limit - self._leg.taken_s
-        self._leg = Leg(self.config.replan_after)
+        self._saved_s += self.config.stop_limit - self._drive.taken_s
+        self._drive.begin()
         self._stay = None
-        self._progress.restart()
 
     def _end(self, state: MissionState, reason: str) -> None:
         if self._stay is not None:  # it stands where it was to go
@@ -526,6 +351,6 @@ class Mission:
 
     def _finish(self, state: MissionState) -> None:
         self._state, self._paused = state, False
-        self._leg.path = None
+        self._drive.interrupt()
         self._message = self._tour.message
         self._events.append(f'{state.value}: {self._message}')

@@ -136,7 +136,7 @@ def test_what_stays_in_the_only_door_is_told() -> None:
     for _ in range(BlockadeConfig().times):
         assert finder.lasting_way(START, GOAL, stamp).length == pytest.approx(6.0, abs=0.1)
         finder.meet(Disc(4.0, 1.0, 0.3), stamp, 20.0)
-        stamp += nanoseconds(BlockadeConfig().span / 3.0)
+        stamp += nanoseconds(BlockadeConfig().span / 4.0)
     with pytest.raises(NoWayError, match=r'something stands in the way at \(4\.0, 1\.0\)'):
         finder.lasting_way(START, GOAL, stamp)
     with pytest.raises(NoWayError, match='something stands in the way'):
