@@ -140,7 +140,9 @@ class Robot:
             self.states.append(status.state)
             decision = self.safety.step(now, velocity, now, where, self.motion)
             command = decision.velocity
-            if self.localizer.status.state is LocalizerState.TRACKING:
+            # Where it stands for long, behind walls say, must not count for more.
+            moving = abs(self.simulator.truth.linear_m_s) > 0.05
+            if moving and self.localizer.status.state is LocalizerState.TRACKING:
                 error = estimate.pose.distance_to(self.simulator.truth.pose)
                 self.errors_m.append(error)
             if not self.errors_m and situation.heading_std_rad > SafetyConfig().heading_std_slow:

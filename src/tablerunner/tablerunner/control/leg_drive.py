@@ -23,7 +23,7 @@ from tablerunner.types import Velocity, nanoseconds
 _PLAN_RETRY_S = 2.0
 _PLAN_TRIES = 4
 _NEAR_M = 0.3
-_LOOK_PAUSE_S = 12.0
+_LOOK_PAUSE_S = 8.0  # no longer than echoes are remembered, or what is there is forgotten
 _RETREAT_S = 20.0
 _ASIDE_S = 4.0
 _RETREAT_AGAIN_S = 30.0

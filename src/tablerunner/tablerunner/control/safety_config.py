@@ -137,7 +137,7 @@ class SafetyConfig(Config):
         dynamic=True,
     )
     memory_time: float = parameter(
-        8.0,
+        16.0,
         description='The same as long as no sensor looks there again and hears nothing',
         unit='s',
         low=0.0,
