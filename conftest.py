@@ -43,8 +43,8 @@ COMPUTING_NICENESS = 3
 
 CORE = 'src/tablerunner/test/'
 FIRST = (
-    # Its participants are in the process of the test: where many have been before, they were seen to
-    # hear neither each other nor the domain they are in.
+    # Its participants are in the process of the test: where many had been before, they were seen
+    # to hear neither each other nor the domain they were in.
     'src/tablerunner_bringup/test/test_doctor.py',
     'test/bringup/',
     'test/bags/',
