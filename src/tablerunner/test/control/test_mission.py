@@ -564,3 +564,35 @@ def test_time_to_confirm_must_be_one(confirm: float) -> None:
     world = World()
     with pytest.raises(MissionError, match='x: the time to confirm'):
         world.mission.start((Destination('x', Pose2(2.0, 2.0), confirm_s=confirm),))
+
+
+def test_robot_in_an_aisle_makes_way_for_whom_it_keeps_from_passing() -> None:
+    """Two who wait for each other would wait for ever: it leaves the aisle, then comes again."""
+    aisle = np.array([[[3.0, 0.5], [8.0, 0.5]], [[3.0, 1.5], [8.0, 1.5]]])
+    world = World(Planner(FloorMap.build(np.concatenate([WALLS, aisle])), 0.25))
+    world.person = Disc(5.5, 1.0, 0.25)
+    world.mission.start((Destination('end', Pose2(7.0, 1.0, 0.0)),))
+    while world.now_s < 60.0 and not any('making way' in event for event in world.events):
+        world.step()
+    assert any('making way' in event for event in world.events)
+    assert world.pose.x > 4.0  # it had come near
+    until = world.now_s + 20.0
+    nearest_x = world.pose.x
+    while world.now_s < until:
+        world.step()
+        nearest_x = min(nearest_x, world.pose.x)
+    assert nearest_x < 3.2
+    world.person = None
+    while world.mission.is_busy and world.now_s < 200.0:
+        status = world.step()
+    assert status.reached == ('end',)
+
+
+def test_mission_slows_down_where_caution_says_so() -> None:
+    world = World()
+    world.mission.start((TABLE,))
+    while world.velocity.linear_m_s < 0.55:
+        world.step()
+    world.mission._ways.caution.hear(nanoseconds(world.now_s + DT), 0.5)
+    world.step()
+    assert 0.0 < world.velocity.linear_m_s < 0.3

@@ -88,6 +88,25 @@ def test_long_other_way_is_taken_only_when_the_thing_stays() -> None:
     assert longer / 0.4 <= taken[0] * 0.05 <= longer / 0.4 + 1.5  # tried every 1.5 s
 
 
+def test_way_that_begins_by_turning_back_is_waited_for() -> None:
+    """The same way at once for one that looks along it, after six seconds for one that turns."""
+    waits = []
+    for heading in (0.0, -0.9):
+        finder, found = make()
+        pose = Pose2(START.x, START.y, heading)
+        path = finder.way(pose, GOAL, NOW)
+        found.put(2.0, 0.5, 1.8)
+        waits.append(
+            next(
+                step * 0.05
+                for step in range(600)
+                if finder.other_way(NOW + step * nanoseconds(0.05), pose, GOAL, path, path.length)
+            )
+        )
+    assert waits[0] < 0.5
+    assert 6.0 <= waits[1] <= 7.6  # tried every 1.5 s
+
+
 def test_patience_begins_anew_when_the_thing_goes_and_comes() -> None:
     finder, found = make()
     path = finder.way(START, GOAL, NOW)
