@@ -62,6 +62,10 @@ class DeliverServer:
             cancel_callback=self._on_cancel,
         )
 
+    def destroy(self) -> None:
+        """Take the action down."""
+        self._server.destroy()
+
     def feedback(self, make: Callable[[str], Deliver.Feedback]) -> None:
         """Publish feedback of each goal, made from its id."""
         for name, goal in self._goals.items():

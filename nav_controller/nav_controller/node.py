@@ -84,7 +84,8 @@ class NavNode(Node):
         self.create_timer(1.0 / config.control_rate, self._on_timer)
 
     def destroy_node(self) -> None:
-        """Let others use the queue's file."""
+        """Take the action down, which rclpy does not, and let others use the queue's file."""
+        self._deliver.destroy()
         if self._store is not None:
             self._store.close()
         super().destroy_node()

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 import typing
-import weakref
 from collections.abc import Callable
 from enum import Enum
 from typing import Any, NamedTuple, TypeVar
@@ -224,13 +223,15 @@ class _Callbacks:
                 group.on_change(config)
 
 
-_CALLBACKS: weakref.WeakKeyDictionary[Node, _Callbacks] = weakref.WeakKeyDictionary()
+_HELD_AS = '_tablerunner_parameter_callbacks'
 
 
 def _callbacks_of(node: Node) -> _Callbacks:
-    callbacks = _CALLBACKS.get(node)
-    if callbacks is None:
-        callbacks = _CALLBACKS[node] = _Callbacks(node)
+    # Held by the node: a table here, even one with weak keys, would hold the node through the
+    # groups' `on_change` for as long as the process lives, and its DDS participant with it.
+    callbacks = vars(node).get(_HELD_AS)
+    if not isinstance(callbacks, _Callbacks):
+        callbacks = vars(node)[_HELD_AS] = _Callbacks(node)
     return callbacks
 
 

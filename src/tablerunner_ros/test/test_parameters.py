@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
@@ -276,3 +277,23 @@ def test_fields_of_unknown_type_is_a_type_error() -> None:
 
     with pytest.raises(TypeError, match=r'Odd\.table'):
         fields_of(Odd)
+
+
+class Changing(Node):
+    """A node that listens for changes itself, as nodes do, and then cannot start."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('changing', **options)
+        declare_config(self, Sample, on_change=self.take)
+        raise ConfigError('port', '', 'a port')
+
+    def take(self, config: Sample) -> None:
+        """Do nothing with it."""
+
+
+def test_node_that_could_not_start_is_let_go(context: Context) -> None:
+    """Or it would speak in its domain for as long as the process lives."""
+    with pytest.raises(ConfigError, match='a port'):
+        Changing(context=context)
+    gc.collect()
+    assert not [item for item in gc.get_objects() if isinstance(item, Changing)]

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -207,5 +208,8 @@ class Probe:
         """Take everything down."""
         self._executor.shutdown()
         for node in [*self._hosted, self.node]:
+            for waitable in list(node.waitables):
+                if isinstance(waitable, ActionClient):  # which rclpy leaves, and with it the node
+                    waitable.destroy()
             node.destroy_node()
         rclpy.shutdown(context=self.context)
