@@ -58,5 +58,8 @@ class Controller(Protocol):
     def traces(self) -> tuple[Trace, ...]:
         """What rule bases decided in the last step; empty where none did or none is asked for."""
 
+    def drive(self, velocity: Velocity) -> None:
+        """Take note that this is driven instead of what the last step said: go on from there."""
+
     def halt(self, dt: float) -> Velocity:
         """Return the next velocity of coming to a stand, whatever the path."""

@@ -28,6 +28,8 @@ _SHARP_M = 0.7
 _WALKER_NS = 10 * NANOSECONDS
 _BEYOND_M = 0.15  # something nearer by this than the echo would have been heard
 _ENOUGH_MISSES = 2
+_STANDING_SHARE = 0.25  # of the time that passes while the robot stands counts for its memory
+_STANDS_M_S, _STANDS_RAD_S = 0.01, 0.02
 _INSIDE_M = 0.02  # deeper inside the hull than noise and motion put what touches it
 
 
@@ -43,7 +45,7 @@ class EchoTimes:
         One that was heard twice and is near [s].
     memory_s : float
         One that was heard twice and not from afar, as long as no sensor looks there and hears
-        nothing [s].
+        nothing; time at which the robot stands counts a quarter [s].
     near_m : float
         Distance from base_link that is near [m].
     hull_m : float
@@ -142,6 +144,10 @@ class EchoMemory:
         self._confirmed = np.empty(0, dtype=bool)  # the reading before heard the same thing
         self._sharp = np.empty(0, dtype=bool)  # and near enough to say where it is
         self._misses = np.empty(0, dtype=np.int64)  # readings that looked there and heard nothing
+        self._heard_at = np.empty(0)  # by the clock of memory
+        # A robot that stands loses no track of where things are, and may be held up by one that no
+        # cone covers: it must not forget that and drive on.
+        self._clock_s = 0.0
 
     def add(self, sample: UltrasonicSample, now: int) -> Refusal | None:
         """Take one reading.
@@ -186,6 +192,7 @@ class EchoMemory:
         sharp = confirmed and sample.range_m <= _SHARP_M and not walking
         self._sharp = np.append(self._sharp, np.full(count, sharp))
         self._misses = np.append(self._misses, np.zeros(count, dtype=np.int64))
+        self._heard_at = np.append(self._heard_at, np.full(count, self._clock_s))
         self._last[sample.sensor] = replace(reading, points=points)
         return None
 
@@ -267,6 +274,8 @@ class EchoMemory:
         self._motion = motion
         if dt <= 0.0:
             return
+        stands = abs(motion.linear_m_s) < _STANDS_M_S and abs(motion.angular_rad_s) < _STANDS_RAD_S
+        self._clock_s += dt * (_STANDING_SHARE if stands else 1.0)
         turn = motion.angular_rad_s * dt
         step = motion.linear_m_s * dt
         self._pose = self._pose @ Pose2(step * math.cos(turn / 2), step * math.sin(turn / 2), turn)
@@ -279,15 +288,17 @@ class EchoMemory:
         age = (now - self._stamps) / NANOSECONDS
         away = np.hypot(self._points[:, 0] - self._pose.x, self._points[:, 1] - self._pose.y)
         newest = self._is_newest()
+        lately = self._clock_s - self._heard_at
         kept = age <= times.hold_s
         kept |= self._confirmed & (away <= times.near_m) & (age <= times.near_s)
-        kept |= self._sharp & (self._misses < _ENOUGH_MISSES) & (age <= times.memory_s)
+        kept |= self._sharp & (self._misses < _ENOUGH_MISSES) & (lately <= times.memory_s)
         kept &= away >= times.hull_m - _INSIDE_M
         kept |= newest
         if not kept.all():
             self._points, self._stamps = self._points[kept], self._stamps[kept]
             self._sensors, self._confirmed = self._sensors[kept], self._confirmed[kept]
             self._sharp, self._misses = self._sharp[kept], self._misses[kept]
+            self._heard_at = self._heard_at[kept]
 
     def _is_newest(self) -> NDArray[np.bool_]:
         last = np.array(

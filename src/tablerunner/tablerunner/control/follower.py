@@ -60,6 +60,10 @@ class PurePursuit:
         self._turning = False
         self._at_end = False
 
+    def drive(self, velocity: Velocity) -> None:
+        """Take note that this is driven instead of what the last step said."""
+        self._velocity = velocity
+
     def halt(self, dt: float) -> Velocity:
         """Return the next velocity of coming to a stand."""
         self._velocity = self.limits.approach(self._velocity, Velocity(), dt)

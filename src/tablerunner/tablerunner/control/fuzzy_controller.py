@@ -157,6 +157,10 @@ class FuzzyController:
         if len(path.points) > 1:
             self._keeper.follow(path)
 
+    def drive(self, velocity: Velocity) -> None:
+        """Take note that this is driven instead of what the last step said."""
+        self._velocity = velocity
+
     def halt(self, dt: float) -> Velocity:
         """Return the next velocity of coming to a stand."""
         self._traces = ()

@@ -75,7 +75,6 @@ class Mission:
         self._lost = LostWatch()
         self._align = AlignmentDrive(config.align_speed, config.align_turn_rate)
         self._drive = LegDrive(config, planner, controller, self._ways)
-        self._saved_s = 0.0  # of the time that the stops so far were given
 
     @property
     def is_busy(self) -> bool:
@@ -131,7 +130,6 @@ class Mission:
         self._message, self._paused = '', False
         self._lost.restart()
         self._begin_leg()
-        self._saved_s = 0.0
         self._state = MissionState.PLANNING
 
     def check(self, tour: Tour) -> None:
@@ -222,12 +220,13 @@ class Mission:
         self._last_stamp = situation.stamp
         readings, self._readings = self._readings, None
         if readings is not None and situation.pose is not None and not self._lost.is_lost:
-            self._ways.hear(readings, situation.pose, situation.stamp)
+            self._ways.hear(readings, situation.pose, situation.stamp, situation.position_std_m)
         velocity: Velocity | None = None
         if self.is_busy and not self._paused:
             velocity = self._advance(situation, elapsed)
             if velocity is not None and situation.pose is not None:
                 velocity = self._ways.caution.slowed(velocity, situation.pose, situation.stamp)
+                self.controller.drive(velocity)
         if velocity is None:
             velocity = self.controller.halt(min(elapsed, _LONGEST_STEP_S))
         status = self.status
@@ -271,7 +270,7 @@ class Mission:
         if not localised or pose is None or stop is None:
             drive.rest()
             return velocity
-        step = drive.step(situation, pose, stop, dt, self.config.stop_limit + self._saved_s)
+        step = drive.step(situation, pose, stop, dt, self.config.stop_limit)
         self._events.extend(drive.events)
         drive.events.clear()
         self._state = self._driving_state
@@ -338,7 +337,6 @@ class Mission:
 
     def _begin_leg(self) -> None:
         """Forget what concerned one stop only."""
-        self._saved_s += self.config.stop_limit - self._drive.taken_s
         self._drive.begin()
         self._stay = None
 

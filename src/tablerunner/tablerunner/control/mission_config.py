@@ -87,8 +87,8 @@ class MissionConfig(Config):
         dynamic=True,
     )
     stop_limit: float = parameter(
-        300.0,
-        description='Time for the way to one stop; what earlier stops did not need is added',
+        600.0,
+        description='Time for the way to one stop',
         unit='s',
         above=0.0,
         dynamic=True,

@@ -25,13 +25,16 @@ from tablerunner.types import seconds
 
 _FADE_EVERY_S = 1.0
 _ARC_M = 0.06  # half the thickness of the arc of an echo
+_ROUGH_M = 0.05  # the map is no more exact than that
 _BEFORE_M = 0.15  # so far before an echo nothing stands
 _SPACING_M = 0.1
+_FAR_M = 1.0  # what is farther from a path than this is of no interest
 _ELSEWHERE = 0.15
 _BLUR_M = 0.08  # places are found wider than they are
 _COMPARED_S = 0.4  # readings farther apart than this are not compared
 _AHEAD_RAD = math.radians(60.0)
-_BESIDE_SHARE = 1.5
+_BESIDE_SHARE, _SUDDEN_SHARE = 1.5, 0.6
+_SUDDEN_M = 0.3  # nearer than before by more than anything at rest that the robot passes by
 _TURNED_RAD = 0.1
 _RUNNING_M_S = 2.5  # nearer by more: another thing than before
 
@@ -50,16 +53,18 @@ class SurroundingsConfig(Config):
         above=0.0,
     )
     explained: float = parameter(
-        0.25,
+        0.1,
         description='An echo is of the map when something on it is so near the arc',
         unit='m',
         low=0.0,
     )
-    foreign: float = parameter(
-        0.3,
-        description='The robot is careful of echoes that are farther from all on the map',
-        unit='m',
+    explained_deviations: float = parameter(
+        3.0,
+        description='The same in standard deviations of the position, where that is more',
         low=0.0,
+    )
+    explained_most: float = parameter(
+        0.25, description='The same at most, however uncertain the pose', unit='m', low=0.0
     )
     passed: float = parameter(
         0.5, description='What speaks against a place that sound has passed', low=0.0
@@ -69,6 +74,9 @@ class SurroundingsConfig(Config):
         description='The same where nothing echoed: sound may have been mirrored away',
         low=0.0,
     )
+    silent_firm: float = parameter(
+        0.25, description='By how much less silence speaks against furniture', low=0.0, high=1.0
+    )
     enough: float = parameter(
         1.5, description='Whole echoes that make something of a place', above=0.0
     )
@@ -77,13 +85,13 @@ class SurroundingsConfig(Config):
         15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
     firm: float = parameter(
-        8.0,
+        3.0,
         description='What was heard for so long is furniture, and forgotten slowly',
         unit='s',
         low=0.0,
     )
     firm_fade_time: float = parameter(
-        120.0, description='Time constant of forgetting furniture', unit='s', above=0.0
+        40.0, description='Time constant of forgetting furniture', unit='s', above=0.0
     )
     shy: float = parameter(
         0.6, description='Who comes nearer than this by himself is waited for', unit='m', low=0.0
@@ -135,15 +143,22 @@ class Surroundings:
         self._approached: int | None = None
         self._floor: FloorMap | None = self._map  # None: to be made anew
 
-    def hear(self, readings: Readings, pose: Pose2, stamp: int) -> tuple[float, ...]:
+    def hear(
+        self, readings: Readings, pose: Pose2, stamp: int, std_m: float = 0.0
+    ) -> tuple[float, ...]:
         """Take what is new in `readings`; `pose` is base_link in map at `stamp` [ns].
+
+        `std_m` is the standard deviation of its position [m].
 
         Returns
         -------
         tuple of float
-            How near it is to what the map does not explain, by new echoes [m]; from beside half as
-            much again, for who comes from there comes at a slant.
+            How near it is to what the map does not explain, by new echoes, each by how soon it may
+            matter [m].
         """
+        config = self.config
+        off_m = max(config.explained, config.explained_deviations * std_m)
+        off_m = min(off_m, config.explained_most)
         unknown: list[float] = []
         dt = 0.0 if self._last is None else max(seconds(stamp - self._last), 0.0)
         self._last = stamp
@@ -156,15 +171,26 @@ class Surroundings:
             self._ages[sensor] = age
             if is_new and age < 0.5 and not math.isnan(distance):
                 at = pose @ self._mounts[sensor]
-                known_m = self._add(distance, at)
-                if known_m > self.config.explained:
+                known_m = self._add(distance, at, off_m)
+                if known_m > off_m:
                     self._compare(sensor, distance, at, stamp)
-                # Nearer to what is on the map a pose that is off may be the reason.
-                if known_m > self.config.foreign:
-                    is_ahead = abs(self._mounts[sensor].heading) < _AHEAD_RAD
-                    unknown.append(distance if is_ahead else _BESIDE_SHARE * distance)
+                if known_m > off_m + _ROUGH_M:
+                    unknown.append(self._share(sensor, distance, stamp) * distance)
                 self._before[sensor] = stamp, distance, at
         return tuple(unknown)
+
+    def _share(self, sensor: int, distance: float, stamp: int) -> float:
+        """Return what share of its distance something that is not on the map is taken to be off.
+
+        Who comes from beside comes at a slant, and is as far again; but one who has just come into
+        a cone that looks there may be walking fast, and meet a robot that has no time left.
+        """
+        before = self._before[sensor]
+        if abs(self._mounts[sensor].heading) < _AHEAD_RAD:
+            return 1.0
+        if before is None or seconds(stamp - before[0]) > _COMPARED_S:
+            return _SUDDEN_SHARE
+        return _SUDDEN_SHARE if before[1] - distance > _SUDDEN_M else _BESIDE_SHARE
 
     def _compare(self, sensor: int, distance: float, at: Pose2, stamp: int) -> None:
         """Take note of what comes nearer by itself, faster than the robot moves towards it."""
@@ -202,8 +228,8 @@ class Surroundings:
         self._fade_s = 0.0
         self._floor = None
 
-    def _add(self, distance: float, at: Pose2) -> float:
-        """Weigh one reading, `at` is the sensor in map.
+    def _add(self, distance: float, at: Pose2, off_m: float) -> float:
+        """Weigh one reading, `at` is the sensor in map, which may be off by `off_m`.
 
         Returns how far what was heard is from anything on the map [m]; 0: nothing was heard.
         """
@@ -230,14 +256,18 @@ class Surroundings:
         away = np.hypot(dx, dy)
         against = config.silent if distance == math.inf else config.passed
         before = in_cone & (away < far - _BEFORE_M)
-        evidence[before] = np.maximum(evidence[before] - against, 0.0)
+        lost = against * (1.0 - aside[before] ** 2)  # less at the edges, which sound may miss
+        if distance == math.inf:  # sound is mirrored away from furniture
+            firm = self._firm_s[rows, columns][before] >= config.firm
+            lost *= np.where(firm, config.silent_firm, 1.0)
+        evidence[before] = np.maximum(evidence[before] - lost, 0.0)
         self._floor = None
         if distance > config.reach:
             return 0.0
         arc = in_cone & (np.abs(away - distance) <= _ARC_M)
         known = floor.distance[rows, columns][arc]
         known_m = float(known.min()) if known.size else 0.0
-        if known_m <= config.explained:
+        if known_m <= off_m:
             return known_m
         # Sound is strongest in the middle of the cone. At its edges an echo rather speaks against
         # something: once is enough to explain it.
@@ -268,27 +298,25 @@ class Surroundings:
                 )
         return self._floor
 
-    def is_in_the_way(self, path: Path, begin: float, length: float, radius: float) -> bool:
-        """Return whether something that was found lies on a part of a path.
+    def gap(self, path: Path, begin: float, length: float) -> float:
+        """Return how near what was found is to a part of a path [m]; inf: nothing was.
 
         Parameters
         ----------
         path : Path
         begin, length : float
             The part, as length along the path [m].
-        radius : float
-            Of what is to pass there [m].
         """
         cells = np.argwhere(self.found)
         if not len(cells):
-            return False
+            return math.inf
         places = self._map.origin + self._map.resolution * cells[:, ::-1]
         end = min(begin + length, path.length)
         arcs = np.linspace(begin, end, max(2, math.ceil((end - begin) / _SPACING_M) + 1))
         points = np.column_stack([np.interp(arcs, path.arc, path.points[:, k]) for k in (0, 1)])
-        low, high = points.min(axis=0) - radius, points.max(axis=0) + radius
+        low, high = points.min(axis=0) - _FAR_M, points.max(axis=0) + _FAR_M
         places = places[np.all((places >= low) & (places <= high), axis=1)]
         if not len(places):
-            return False
+            return math.inf
         away2 = np.sum((points[:, None, :] - places[None]) ** 2, axis=-1)
-        return bool(away2.min() < radius**2)
+        return math.sqrt(away2.min())

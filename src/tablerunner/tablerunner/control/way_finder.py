@@ -26,6 +26,7 @@ _WITHIN_M = 0.05  # what is found is wider than it is: a way may lead so near th
 _LONGER_M = 1.5
 _WALK_M_S = 0.4  # about the mean speed of a robot that gets on
 _MOVED_M = 0.3
+_ASIDE_M = 0.5
 _YIELDS_S = 3.0
 _TURN_BACK_S, _TURN_BACK_RAD, _BEGIN_M = 6.0, 1.3, 0.6
 
@@ -72,10 +73,13 @@ class WayFinder:
         if blockades is not None:
             self._blockades.config = blockades
 
-    def hear(self, readings: Readings, pose: Pose2, stamp: int) -> None:
-        """Take what the sensors hear at `stamp` [ns] with base_link at `pose` in map."""
+    def hear(self, readings: Readings, pose: Pose2, stamp: int, std_m: float) -> None:
+        """Take what the sensors hear at `stamp` [ns] with base_link at `pose` in map.
+
+        `std_m` is the standard deviation of its position [m].
+        """
         if self.surroundings is not None:
-            for gap in self.surroundings.hear(readings, pose, stamp):
+            for gap in self.surroundings.hear(readings, pose, stamp, std_m):
                 self.caution.hear(stamp, gap)
             if self.surroundings.is_approached(stamp):
                 self.caution.meet(stamp)
@@ -213,10 +217,11 @@ class WayFinder:
         if found is None or stamp < self._look_at:
             return None
         self._look_at = stamp + _LOOK_NS
-        radius = self.planner.footprint_radius - _WITHIN_M
-        if not found.is_in_the_way(path, max(path.length - left_m, 0.0), _AHEAD_M, radius):
+        begin = max(path.length - left_m, 0.0)
+        gap = found.gap(path, begin, _AHEAD_M)
+        if gap >= self.planner.footprint_radius - _WITHIN_M:
             self._barred_since = None
-            return None
+            return self._roomier(stamp, pose, stop, path, left_m, gap)
         if self._barred_since is None:
             self._barred_since = stamp
         self._look_at = stamp + _LOOK_AGAIN_NS
@@ -232,6 +237,25 @@ class WayFinder:
             return None
         self._barred_since = None
         return other
+
+    def _roomier(
+        self,
+        stamp: int,
+        pose: Pose2,
+        stop: Destination,
+        path: Path,
+        left_m: float,
+        gap: float,
+    ) -> Path | None:
+        """Return a way that keeps farther off what was found than a `path` that just misses it."""
+        found, planner = self.surroundings, self.planner
+        if found is None or gap >= planner.footprint_radius + planner.config.clearance:
+            return None
+        self._look_at = stamp + _LOOK_AGAIN_NS
+        other = self._round(pose, stop, stamp)
+        if other is None or other.length > left_m + _ASIDE_M or _turns(pose, other, 0.0):
+            return None
+        return other if found.gap(other, 0.0, _AHEAD_M) >= gap + _WITHIN_M else None
 
     def has_moved(self, pose: Pose2) -> bool:
         """Return whether the robot has moved since this was last true; it was not, at first.

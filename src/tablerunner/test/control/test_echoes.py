@@ -216,3 +216,25 @@ def test_thing_that_appears_counts_as_closing_for_a_second() -> None:
         heard = echoes.heard(S(time_s))
         assert heard is not None
         assert heard.closing.all() == closing
+
+
+@pytest.mark.parametrize(('motion', 'kept_s'), [(Velocity(), 24.0), (Velocity(0.0, 0.1), 6.0)])
+def test_robot_that_stands_remembers_four_times_as_long(motion: Velocity, kept_s: float) -> None:
+    """What held it up may be where no cone looks: it must not drive on for having waited."""
+    echoes = memory()
+    for time_s in (1.0, 1.15):
+        echoes.add(reading(time_s, 0.3, 'left'), S(time_s))
+    lasted = 0.0
+    while lasted < 60.0:
+        lasted += 0.1
+        echoes.move(motion, 0.1)
+        now = 1.15 + lasted
+        # It looks elsewhere meanwhile: far off, in front.
+        echoes.add(reading(now, 2.5), S(now))
+        echoes.forget(S(now))
+        heard = echoes.heard(S(now))
+        assert heard is not None
+        if np.hypot(*(heard.points.T)).min() > 1.0:
+            break
+        echoes._last['left'] = echoes._last['front']  # the newest of a sensor is always kept
+    assert lasted == pytest.approx(kept_s, abs=0.3)

@@ -596,3 +596,19 @@ def test_mission_slows_down_where_caution_says_so() -> None:
     world.mission._ways.caution.hear(nanoseconds(world.now_s + DT), 0.5)
     world.step()
     assert 0.0 < world.velocity.linear_m_s < 0.3
+
+
+def test_robot_that_stands_for_somebody_does_not_speed_up_first() -> None:
+    """It comes to a stand from what it drives, not from what it would drive without caution."""
+    world = World()
+    world.mission.start((TABLE,))
+    while world.velocity.linear_m_s < 0.55:
+        world.step()
+    for _ in range(3):
+        world.mission._ways.caution.hear(nanoseconds(world.now_s + DT), 0.5)
+        world.step()
+    slow = world.velocity.linear_m_s
+    assert 0.0 < slow < 0.3
+    world.mission.pause()
+    world.step()
+    assert world.velocity.linear_m_s < slow

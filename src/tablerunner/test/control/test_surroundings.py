@@ -41,12 +41,12 @@ class Listener:
         """Let the room be another one from now on."""
         self.sonar = Sonar(there, np.random.default_rng(99))
 
-    def stand(self, pose: Pose2, seconds: float) -> None:
+    def stand(self, pose: Pose2, seconds: float, std_m: float = 0.0) -> None:
         """Hear for a while from one pose, firing every 30 ms as the simulator does."""
         for _ in range(round(seconds / 0.03)):
             self.stamp += nanoseconds(0.03)
             self.ring.add(self.sonar.fire(self.stamp, pose, ()), self.stamp)
-            self.found.hear(self.ring.readings(self.stamp), pose, self.stamp)
+            self.found.hear(self.ring.readings(self.stamp), pose, self.stamp, std_m)
 
     def places(self) -> np.ndarray:
         """Return where something was found, shape (n, 2)."""
@@ -121,17 +121,19 @@ def test_furniture_is_forgotten_slowly_but_at_once_when_it_has_gone() -> None:
 
 def test_floor_and_path_show_what_was_found() -> None:
     listener = Listener(room(CHAIR), room(), 1)
-    assert not listener.found.is_in_the_way(PATH, 0.0, 4.0, 0.28)
+    assert listener.found.gap(PATH, 0.0, 4.0) == math.inf
     listener.stand(Pose2(2.0, 2.0, 0.0), 2.0)
     floor = listener.found.floor
     assert floor.distance_at(np.array([2.78, 2.0])) < 0.06
     assert floor.distance_at(np.array([2.28, 2.0])) == pytest.approx(0.5, abs=0.1)
-    assert listener.found.is_in_the_way(PATH, 0.0, 4.0, 0.28)
-    assert listener.found.is_in_the_way(PATH, 1.0, 1.0, 0.28)
-    assert not listener.found.is_in_the_way(PATH, 0.0, 1.2, 0.28)  # ends 0.5 m before it
-    assert not listener.found.is_in_the_way(PATH, 2.5, 1.5, 0.28)
-    beside = Path(np.array([[1.0, 3.0], [5.0, 3.0]]))
-    assert not listener.found.is_in_the_way(beside, 0.0, 4.0, 0.28)
+    assert listener.found.gap(PATH, 0.0, 4.0) < 0.05
+    assert listener.found.gap(PATH, 1.0, 1.0) < 0.05
+    assert listener.found.gap(PATH, 0.0, 1.2) == pytest.approx(0.55, abs=0.05)  # ends before it
+    assert listener.found.gap(PATH, 2.5, 1.5) > 0.5
+    beside = Path(np.array([[1.0, 2.6], [5.0, 2.6]]))
+    assert 0.4 < listener.found.gap(beside, 0.0, 4.0) <= 0.6
+    far = Path(np.array([[1.0, 3.5], [5.0, 3.5]]))
+    assert listener.found.gap(far, 0.0, 4.0) == math.inf
     listener.found.reset()
     assert not len(listener.places())
 
@@ -178,3 +180,57 @@ def test_who_has_come_nearer_is_waited_for_only_for_a_while() -> None:
     listener.turn_to(room())
     listener.stand(Pose2(1.0, 2.0, 0.0), SurroundingsConfig().yield_time + 0.1)
     assert not listener.found.is_approached(listener.stamp)
+
+
+@pytest.mark.parametrize(
+    ('std_m', 'is_found'), [(0.0, True), (0.03, True), (0.1, False), (math.inf, False)]
+)
+def test_echo_beside_the_map_is_explained_by_it_when_the_pose_may_be_off(
+    std_m: float, is_found: bool
+) -> None:
+    """Something stands 0.12 m before a shelf that is on the map."""
+    shelf = Box('shelf', 3.2, 2.0, 0.4, 3.0)
+    ahead = Box('crates', 2.85, 2.0, 0.26, 3.0)
+    listener = Listener(room(shelf, ahead), room(shelf), 1)
+    listener.stand(Pose2(2.1, 2.0, 0.0), 2.0, std_m)
+    assert bool(len(listener.places())) is is_found
+
+
+def test_uncertain_pose_does_not_explain_what_is_far_from_the_map() -> None:
+    listener = Listener(room(CHAIR), room(), 1)
+    listener.stand(Pose2(2.0, 2.0, 0.0), 2.0, math.inf)
+    assert len(listener.places())
+
+
+def test_edge_of_a_cone_hardly_speaks_against_a_place() -> None:
+    """Silence along a wall is what slanting sound is, not a wall that has gone."""
+    listener = Listener(room(), room(), 1)
+    found, at = listener.found, Pose2(2.0, 2.0, 0.0)
+    middle, edge = found._map.cell(3.0, 2.0), found._map.cell(3.0, 2.2)
+    found._evidence[middle] = found._evidence[edge] = 4.0
+    listener.stand(at, 0.8)
+    lost = 4.0 - found._evidence[middle], 4.0 - found._evidence[edge]
+    assert lost[0] > 0.3
+    assert lost[1] < 0.5 * lost[0]
+
+
+def test_one_who_has_just_come_into_a_side_cone_counts_as_near() -> None:
+    """0.6 of the distance at first, 1.5 times that once he stays; ahead it is the distance."""
+    gaps = {}
+    for name, heading in (('beside', 0.0), ('ahead', math.pi / 2.0)):
+        listener = Listener(room(), room(), 1)
+        pose = Pose2(2.0, 2.0, heading)
+        listener.stand(pose, 0.5)
+        listener.turn_to(room(Box('chair', 2.0, 3.0, 0.45, 0.45)))
+        heard: list[float] = []
+        for _ in range(40):
+            listener.stamp += nanoseconds(0.03)
+            listener.ring.add(listener.sonar.fire(listener.stamp, pose, ()), listener.stamp)
+            readings = listener.ring.readings(listener.stamp)
+            heard += listener.found.hear(readings, pose, listener.stamp)
+        gaps[name] = heard
+    distance = np.median(gaps['ahead'])
+    assert 0.4 < distance < 0.8
+    assert gaps['beside'][0] == pytest.approx(0.6 * distance, abs=0.06)
+    assert gaps['beside'][-1] == pytest.approx(1.5 * distance, abs=0.12)
+    assert max(gaps['ahead']) - min(gaps['ahead']) < 0.1

@@ -71,7 +71,28 @@ def test_short_other_way_is_taken_at_once() -> None:
     assert finder.other_way(soon, START, GOAL, path, path.length) is None  # looks 4 times a s
     other = finder.other_way(NOW + nanoseconds(0.3), START, GOAL, path, path.length)
     assert other is not None
-    assert not found.is_in_the_way(other, 0.0, other.length, 0.28)
+    assert found.gap(other, 0.0, other.length) > 0.28
+
+
+def test_way_that_just_misses_something_is_left_for_a_roomier_one() -> None:
+    finder, found = make()
+    path = finder.way(START, GOAL, NOW)
+    found.put(2.5, 0.3, 0.76)
+    assert 0.2 < found.gap(path, 0.0, 3.0) < 0.3
+    other = finder.other_way(NOW, START, GOAL, path, path.length)
+    assert other is not None
+    assert found.gap(other, 0.0, other.length) > 0.36
+    assert other.length < path.length + 0.5
+    later = NOW + nanoseconds(2.0)
+    assert finder.other_way(later, START, GOAL, other, other.length) is None  # it is as good
+
+
+def test_way_that_just_misses_something_is_kept_where_there_is_no_roomier_one() -> None:
+    finder, found = make(Wall(((2.5, 1.3), (2.5, 5.0)), 'wall'))
+    found.put(2.5, 0.0, 0.55)
+    path = finder.way(START, GOAL, NOW)
+    assert found.gap(path, 0.0, 3.0) < 0.37
+    assert finder.other_way(NOW, START, GOAL, path, path.length) is None
 
 
 def test_long_other_way_is_taken_only_when_the_thing_stays() -> None:
