@@ -221,7 +221,7 @@ class WayFinder:
         gap = found.gap(path, begin, _AHEAD_M)
         if gap >= self.planner.footprint_radius - _WITHIN_M:
             self._barred_since = None
-            return self._roomier(stamp, pose, stop, path, left_m, gap)
+            return self._roomier(stamp, pose, stop, left_m, gap)
         if self._barred_since is None:
             self._barred_since = stamp
         self._look_at = stamp + _LOOK_AGAIN_NS
@@ -243,11 +243,10 @@ class WayFinder:
         stamp: int,
         pose: Pose2,
         stop: Destination,
-        path: Path,
         left_m: float,
         gap: float,
     ) -> Path | None:
-        """Return a way that keeps farther off what was found than a `path` that just misses it."""
+        """Return a way that keeps farther off what was found than one that misses it by `gap`."""
         found, planner = self.surroundings, self.planner
         if found is None or gap >= planner.footprint_radius + planner.config.clearance:
             return None

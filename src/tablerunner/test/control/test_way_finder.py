@@ -172,11 +172,11 @@ def test_what_was_met_is_kept_off_the_longer_the_oftener() -> None:
 def test_what_stays_in_the_only_door_is_told() -> None:
     door = (Wall(((4.0, 1.6), (4.0, 5.0)), 'wall'), Wall(((4.0, 0.0), (4.0, 0.4)), 'post'))
     finder, _ = make(*door)
-    stamp = NOW
-    for _ in range(BlockadeConfig().times):
+    config = BlockadeConfig()
+    stamps = NOW + np.linspace(0, nanoseconds(config.span), config.times).astype(int)
+    for stamp in map(int, stamps):
         assert finder.lasting_way(START, GOAL, stamp).length == pytest.approx(6.0, abs=0.1)
         finder.meet(Disc(4.0, 1.0, 0.3), stamp, 20.0)
-        stamp += nanoseconds(BlockadeConfig().span / 4.0)
     with pytest.raises(NoWayError, match=r'something stands in the way at \(4\.0, 1\.0\)'):
         finder.lasting_way(START, GOAL, stamp)
     with pytest.raises(NoWayError, match='something stands in the way'):

@@ -69,9 +69,9 @@ def is_spoken_in(domain: int) -> bool:
 
 
 def _bound_ports() -> Iterator[int]:
-    """Yield the UDP ports that processes of this machine have bound; none where Linux' list is not.
+    """Yield the UDP ports that are bound on this machine; none where Linux' list is not.
 
-    Each line has a number, then local address and port in hexadecimal.
+    Each of its lines has a number, then local address and port in hexadecimal.
     """
     if _PORTS.exists():
         for line in _PORTS.read_text(encoding='ascii').splitlines()[1:]:
