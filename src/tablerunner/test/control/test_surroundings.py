@@ -206,12 +206,25 @@ def test_edge_of_a_cone_hardly_speaks_against_a_place() -> None:
     """Silence along a wall is what slanting sound is, not a wall that has gone."""
     listener = Listener(room(), room(), 1)
     found, at = listener.found, Pose2(2.0, 2.0, 0.0)
-    middle, edge = found._map.cell(3.0, 2.0), found._map.cell(3.0, 2.2)
+    middle, edge = found._map.cell(3.0, 2.0), found._map.cell(3.0, 2.15)
     found._evidence[middle] = found._evidence[edge] = 4.0
     listener.stand(at, 0.8)
     lost = 4.0 - found._evidence[middle], 4.0 - found._evidence[edge]
     assert lost[0] > 0.3
-    assert lost[1] < 0.5 * lost[0]
+    assert 0.0 < lost[1] < 0.6 * lost[0]
+
+
+def test_silence_speaks_less_against_furniture() -> None:
+    """Sound is mirrored away from a flat thing at a slant."""
+    listener = Listener(room(), room(), 1)
+    found, at = listener.found, Pose2(2.0, 2.0, 0.0)
+    firm, new = found._map.cell(3.0, 2.05), found._map.cell(3.0, 1.95)
+    found._evidence[firm] = found._evidence[new] = 4.0
+    found._firm_s[firm] = found.config.firm + 1.0
+    listener.stand(at, 0.8)
+    lost_firm, lost_new = 4.0 - found._evidence[firm], 4.0 - found._evidence[new]
+    assert lost_new > 0.3
+    assert lost_firm == pytest.approx(found.config.silent_firm * lost_new, rel=0.2)
 
 
 def test_one_who_has_just_come_into_a_side_cone_counts_as_near() -> None:
