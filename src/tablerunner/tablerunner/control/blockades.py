@@ -24,7 +24,7 @@ class BlockadeConfig(Config):
         5, description='How often the robot was held up at a place', low=1, dynamic=True
     )
     span: float = parameter(
-        240.0,
+        180.0,
         description='From the first time to the last',
         unit='s',
         low=0.0,

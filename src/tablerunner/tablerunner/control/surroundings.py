@@ -85,7 +85,7 @@ class SurroundingsConfig(Config):
         15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
     firm: float = parameter(
-        3.0,
+        5.0,
         description='What was heard for so long is furniture, and forgotten slowly',
         unit='s',
         low=0.0,
