@@ -19,6 +19,7 @@ from tablerunner.config import Config, parameter
 from tablerunner.control.floor_map import FloorMap
 from tablerunner.control.fuzzy.readings import Readings
 from tablerunner.control.path import Path
+from tablerunner.errors import ConfigError
 from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import seconds
@@ -105,6 +106,11 @@ class SurroundingsConfig(Config):
     opening: float = parameter(
         0.48, description='Full opening of the cones', unit='rad', above=0.0, high=3.0
     )
+
+    def check(self) -> None:
+        """Keep the bounds in their order."""
+        if self.explained > self.explained_most:
+            raise ConfigError('explained', self.explained, 'at most explained_most')
 
 
 class Surroundings:

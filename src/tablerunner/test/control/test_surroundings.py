@@ -10,6 +10,7 @@ import pytest
 from tablerunner.control import Surroundings, SurroundingsConfig, make_planner, make_surroundings
 from tablerunner.control.fuzzy import UltrasonicRing
 from tablerunner.control.path import Path
+from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
 from tablerunner.scenario import Box, Scenario, Wall
 from tablerunner.simulation.sonar import Sonar
@@ -247,3 +248,8 @@ def test_one_who_has_just_come_into_a_side_cone_counts_as_near() -> None:
     assert gaps['beside'][0] == pytest.approx(0.6 * distance, abs=0.06)
     assert gaps['beside'][-1] == pytest.approx(1.5 * distance, abs=0.12)
     assert max(gaps['ahead']) - min(gaps['ahead']) < 0.1
+
+
+def test_least_margin_above_the_most_is_named() -> None:
+    with pytest.raises(ConfigError, match=r'explained.*0\.3.*at most explained_most'):
+        SurroundingsConfig(explained=0.3)
