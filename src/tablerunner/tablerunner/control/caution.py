@@ -2,7 +2,8 @@
 
 The safety stop minds what it hears. Somebody who steps from behind a door post is heard too late
 for that, and whoever stands beside the way may set off at any moment. So the mission asks for less
-speed where the map hides a place to walk, and beside what the map does not explain.
+speed where the map hides a place to walk, beside what the map does not explain, and for a while
+after somebody came nearer: between the cones of the sensors others may come unheard.
 """
 
 from __future__ import annotations
@@ -65,6 +66,16 @@ class CautionConfig(Config):
     hold: float = parameter(
         0.7, description='How long what was heard counts', unit='s', low=0.0, dynamic=True
     )
+    busy_speed: float = parameter(
+        0.35,
+        description='Largest speed where somebody has come nearer lately',
+        unit='m/s',
+        above=0.0,
+        dynamic=True,
+    )
+    busy_time: float = parameter(
+        60.0, description='How long that is lately', unit='s', low=0.0, dynamic=True
+    )
 
 
 class Caution:
@@ -119,12 +130,17 @@ class Caution:
             if gap < math.inf:
                 wise = largest_speed(gap, config.delay, config.deceleration, config.hidden_pace)
                 top = min(top, float(wise))
+        if self._met_within(config.busy_time, stamp):
+            top = min(top, config.busy_speed)
         return max(top, self._least(stamp))
+
+    def _met_within(self, time_s: float, stamp: int) -> bool:
+        """Return whether somebody has come nearer within that time."""
+        return self._met is not None and 0.0 <= seconds(stamp - self._met) < time_s
 
     def _least(self, stamp: int) -> float:
         """Return the speed at which the robot gets on in any case."""
-        walks = self._met is not None and 0.0 <= seconds(stamp - self._met) < _WALKS_S
-        close = walks and any(gap < _CLOSE_M for _, gap in self._heard)
+        close = self._met_within(_WALKS_S, stamp) and any(gap < _CLOSE_M for _, gap in self._heard)
         return self.config.least_speed * (_CLOSE_SHARE if close else 1.0)
 
     def hidden_gap(self, pose: Pose2) -> float:

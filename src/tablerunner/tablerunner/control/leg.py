@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from tablerunner.control.floor_map import Disc
 from tablerunner.control.path import Path
+
+_NOWHERE = Disc(math.nan, math.nan, 0.0)
 
 
 @dataclass
@@ -34,6 +37,8 @@ class Leg:
         Whether it is time to look around.
     retreat_until : int
         Until this stamp the robot makes way for somebody [ns]; 0: it does not.
+    retreat_from : Disc
+        Where he stands.
     retreated : bool
         Whether it stands where it went for that.
     retreat_again : int
@@ -50,5 +55,6 @@ class Leg:
     blocked_s: float = 0.0
     stuck: bool = False
     retreat_until: int = 0
+    retreat_from: Disc = _NOWHERE
     retreated: bool = False
     retreat_again: int = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -17,6 +18,7 @@ from tablerunner.control.planner import Planner
 from tablerunner.control.progress import ProgressWatch
 from tablerunner.control.way_finder import WayFinder, patience
 from tablerunner.errors import NoWayError, PlanningError
+from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
 from tablerunner.types import Velocity, nanoseconds
 
@@ -24,8 +26,9 @@ _PLAN_RETRY_S = 2.0
 _PLAN_TRIES = 4
 _NEAR_M = 0.3
 _LOOK_PAUSE_S = 8.0  # no longer than echoes are remembered, or what is there is forgotten
-_RETREAT_S = 20.0
-_ASIDE_S = 4.0
+_RETREAT_S = 40.0
+_ASIDE_S = 8.0
+_FACE_RATE, _FACING_RAD = 0.6, 0.15
 _RETREAT_AGAIN_S = 30.0
 
 
@@ -157,7 +160,7 @@ class LegDrive:
         if self._ways.is_approached(situation.stamp):
             return _STAND
         if leg.retreat_until:
-            return self._make_way(situation, pose, dt)
+            return self._make_way(situation, pose, stop, dt)
         self._look_ahead(situation, pose, stop)
         drive = self._controller.step(pose, dt)
         leg.distance_left = drive.distance_left
@@ -261,11 +264,13 @@ class LegDrive:
         """
         left = self._leg.distance_left
         mark = disc_ahead(situation, pose, self.planner.footprint_radius)
-        times = self._ways.meet(mark, situation.stamp, self.config.mark_time)
+        times = self._ways.meet(mark, situation.stamp, self.config.mark_time, stuck_s)
         try:
             path = self._ways.way_around(pose, stop, situation.stamp)
         except PlanningError as error:
-            if self._retreats(situation, pose, mark):
+            # He who stands there has had time to go: is it somebody at all?
+            patient_s = self.config.replan_after * (1 if times == 1 else 2)
+            if stuck_s >= patient_s and self._retreats(situation, pose, mark):
                 return ''
             return self._wait_before(situation, pose, stop, error)
         if stuck_s < self.config.replan_after + patience(path.length - left) / times:
@@ -299,20 +304,32 @@ class LegDrive:
         self._follow(path, LegPhase.BLOCKED)
         leg.retreat_until = situation.stamp + nanoseconds(_RETREAT_S)
         leg.retreat_again = situation.stamp + nanoseconds(_RETREAT_AGAIN_S)
-        leg.retreated = False
+        leg.retreated, leg.retreat_from = False, mark
         self.events.append(f'making way: {path.length:.1f} m aside')
         return True
 
-    def _make_way(self, situation: Situation, pose: Pose2, dt: float) -> LegStep:
-        """Drive out of somebody's way, stand there for a while, then plan anew."""
+    def _make_way(
+        self, situation: Situation, pose: Pose2, stop: Destination, dt: float
+    ) -> LegStep:
+        """Drive out of somebody's way, face him for a while or until he is gone, plan anew."""
         leg = self._leg
-        if situation.stamp >= leg.retreat_until:
+        over = situation.stamp >= leg.retreat_until
+        if over or (leg.retreated and self._ways.is_free(situation.stamp, pose, stop)):
             leg.retreat_until, leg.path = 0, None
             return _STAND
         if leg.retreated:
-            return _STAND
+            return LegStep(_turn_to(pose, leg.retreat_from))
         drive = self._controller.step(pose, dt)
         if drive.arrived:
             leg.retreated = True
             leg.retreat_until = situation.stamp + nanoseconds(_ASIDE_S)
         return LegStep(drive.velocity)
+
+
+def _turn_to(pose: Pose2, disc: Disc) -> Velocity | None:
+    """Return the velocity of turning to face a place; None: the robot faces it."""
+    course = math.atan2(disc.y - pose.y, disc.x - pose.x)
+    error = difference(course, pose.heading)
+    if abs(error) < _FACING_RAD:
+        return None
+    return Velocity(0.0, math.copysign(min(_FACE_RATE, 2.0 * abs(error)), error))

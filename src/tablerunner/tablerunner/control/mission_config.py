@@ -66,7 +66,7 @@ class MissionConfig(Config):
         dynamic=True,
     )
     replan_after: float = parameter(
-        5.0,
+        9.0,
         description='Blocked for longer: look for a way around',
         unit='s',
         above=0.0,

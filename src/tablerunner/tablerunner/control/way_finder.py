@@ -105,13 +105,14 @@ class WayFinder:
         """Forget for good where something stood that was met on the way."""
         self._blockades.clear()
 
-    def meet(self, disc: Disc, stamp: int, mark_s: float) -> int:
+    def meet(self, disc: Disc, stamp: int, mark_s: float, stood_s: float) -> int:
         """Take note of what holds the robot up; return how often it did so at this place.
 
         Ways keep off it for `mark_s` [s] the first time, four times as long the second time, and
-        so on: what was there twice is hardly somebody who walks.
+        so on: what was there twice is hardly somebody who walks. `stood_s` is how long the robot
+        has stood before it [s].
         """
-        self._blockades.add(disc, stamp)
+        self._blockades.add(disc, stamp, stood_s)
         times = self._blockades.times(disc, stamp)
         self._marks.add(disc, stamp + nanoseconds(mark_s * times**2))
         return times
@@ -133,7 +134,8 @@ class WayFinder:
             return self._plan(pose, stop, self._discs(stamp))
         except PlanningError:
             self._marks.clear()  # better wait before it than have no way at all
-        return self.lasting_way(pose, stop, stamp)
+        path = self._round(pose, stop, stamp)
+        return self.lasting_way(pose, stop, stamp) if path is None else path
 
     def way_around(self, pose: Pose2, stop: Destination, stamp: int) -> Path:
         """Return a way round all that is known of.
@@ -168,6 +170,23 @@ class WayFinder:
         if self.surroundings is not None:
             planner = replace(planner, floor=self.surroundings.floor)
         return way_to_refuge(planner, pose, disc, path, left_m)
+
+    def is_free(self, stamp: int, pose: Pose2, stop: Destination) -> bool:
+        """Return whether a way is free of all that is heard now; looked at now and then."""
+        if self.surroundings is None or stamp < self._look_at:
+            return False
+        self._look_at = stamp + _LOOK_AGAIN_NS
+        planner = replace(self.planner, floor=self.surroundings.floor)
+        try:
+            planner.plan(
+                pose,
+                stop.pose,
+                keep_heading=stop.keep_heading,
+                blocked=self._blockades.standing(stamp),
+            )
+        except PlanningError:
+            return False
+        return True
 
     def _discs(self, stamp: int) -> tuple[Disc, ...]:
         return (*self._marks.discs(stamp), *self._blockades.standing(stamp))

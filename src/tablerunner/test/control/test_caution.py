@@ -84,6 +84,14 @@ def test_least_speed_is_kept_and_halved_right_beside_somebody_who_walks() -> Non
     assert caution.top_speed(pose, NOW) == 0.5 * CONFIG.least_speed
 
 
+def test_after_somebody_came_nearer_it_is_slower_for_a_while() -> None:
+    caution = Caution(floor(), RADIUS)
+    pose = Pose2(2.0, 2.0, 0.0)
+    caution.meet(NOW)
+    assert caution.top_speed(pose, NOW + nanoseconds(CONFIG.busy_time - 0.1)) == CONFIG.busy_speed
+    assert caution.top_speed(pose, NOW + nanoseconds(CONFIG.busy_time + 0.1)) == math.inf
+
+
 def test_slowing_keeps_the_arc_and_lets_turns_and_reverse_alone() -> None:
     caution = Caution(floor(), RADIUS)
     caution.hear(NOW, 0.5)

@@ -588,6 +588,44 @@ def test_robot_in_an_aisle_makes_way_for_whom_it_keeps_from_passing() -> None:
     assert status.reached == ('end',)
 
 
+def test_robot_that_made_way_faces_the_place_and_goes_when_it_is_free() -> None:
+    aisle = np.array([[[3.0, 0.5], [8.0, 0.5]], [[3.0, 1.5], [8.0, 1.5]]])
+    world = World(Planner(FloorMap.build(np.concatenate([WALLS, aisle])), 0.25))
+    world.person = person = Disc(5.5, 1.0, 0.25)
+    world.mission.start((Destination('end', Pose2(7.0, 1.0, 0.0)),))
+    drive = world.mission._drive
+    while world.now_s < 100.0 and not drive._leg.retreated:
+        world.step()
+    arrived_s = world.now_s
+    while world.now_s < arrived_s + 5.0:
+        world.step()
+    assert drive._leg.retreated
+    assert world.velocity == Velocity()
+    course = math.atan2(person.y - world.pose.y, person.x - world.pose.x)
+    assert abs(wrap(course - world.pose.heading)) < 0.25  # where it was held up is known to 0.3 m
+    drive._ways.is_free = lambda *_: True  # type: ignore[method-assign]
+    world.step()
+    assert not drive._leg.retreat_until
+
+
+def test_robot_stands_longer_before_what_holds_it_up_again() -> None:
+    """Making way at once, each time, would never tell somebody from something that stays."""
+    aisle = np.array([[[3.0, 0.5], [8.0, 0.5]], [[3.0, 1.5], [8.0, 1.5]]])
+    world = World(Planner(FloorMap.build(np.concatenate([WALLS, aisle])), 0.25))
+    world.person = Disc(5.5, 1.0, 0.25)
+    world.mission.start((Destination('end', Pose2(7.0, 1.0, 0.0)),))
+    stood_s, standing_s = [], 0.0
+    while world.mission.is_busy and world.now_s < 400.0 and len(stood_s) < 2:
+        status = world.step()
+        standing_s = standing_s + DT if status.state is MissionState.BLOCKED else 0.0
+        if any('making way' in event for event in status.events):
+            stood_s.append(standing_s)
+    first, second = stood_s
+    config = MissionConfig()
+    assert first == pytest.approx(config.replan_after - config.blocked_after, abs=0.2)
+    assert second == pytest.approx(2.0 * config.replan_after - config.blocked_after, abs=0.2)
+
+
 def test_mission_slows_down_where_caution_says_so() -> None:
     world = World()
     world.mission.start((TABLE,))

@@ -160,11 +160,11 @@ def test_what_was_met_is_kept_off_the_longer_the_oftener() -> None:
     finder, _ = make(Wall(((4.0, 2.5), (4.0, 5.0)), 'wall'))
     thing = Disc(4.0, 1.25, 0.3)
     straight = finder.way(START, GOAL, NOW).length
-    finder.meet(thing, NOW, 20.0)
+    finder.meet(thing, NOW, 20.0, 20.0)
     assert finder.way(START, GOAL, NOW).length > straight + 0.05
     assert finder.way(START, GOAL, NOW + nanoseconds(21.0)).length == pytest.approx(straight)
     again = NOW + nanoseconds(30.0)
-    finder.meet(thing, again, 20.0)
+    finder.meet(thing, again, 20.0, 20.0)
     assert finder.way(START, GOAL, again + nanoseconds(79.0)).length > straight + 0.05
     assert finder.way(START, GOAL, again + nanoseconds(81.0)).length == pytest.approx(straight)
 
@@ -176,13 +176,35 @@ def test_what_stays_in_the_only_door_is_told() -> None:
     stamps = NOW + np.linspace(0, nanoseconds(config.span), config.times).astype(int)
     for stamp in map(int, stamps):
         assert finder.lasting_way(START, GOAL, stamp).length == pytest.approx(6.0, abs=0.1)
-        finder.meet(Disc(4.0, 1.0, 0.3), stamp, 20.0)
+        finder.meet(Disc(4.0, 1.0, 0.3), stamp, 20.0, 20.0)
     with pytest.raises(NoWayError, match=r'something stands in the way at \(4\.0, 1\.0\)'):
         finder.lasting_way(START, GOAL, stamp)
     with pytest.raises(NoWayError, match='something stands in the way'):
         finder.way(START, GOAL, stamp)
     finder.forget()
     assert finder.lasting_way(START, GOAL, stamp).length == pytest.approx(6.0, abs=0.1)
+
+
+def test_way_is_free_when_nothing_is_heard_there_whatever_was_met_before() -> None:
+    finder, found = make(Wall(((4.0, 2.5), (4.0, 5.0)), 'wall'))
+    finder.meet(Disc(4.0, 1.25, 1.2), NOW, 20.0, 9.0)
+    with pytest.raises(PlanningError):
+        finder.way_around(START, GOAL, NOW)
+    assert finder.is_free(NOW, START, GOAL)
+    found.put(4.0, 0.0, 2.5)
+    later = NOW + nanoseconds(2.0)
+    assert not finder.is_free(later, START, GOAL)
+    found.reset()
+    assert not finder.is_free(later + nanoseconds(0.1), START, GOAL)  # looks now and then only
+    assert finder.is_free(later + nanoseconds(2.0), START, GOAL)
+
+
+def test_what_is_heard_is_kept_off_also_when_marks_leave_no_way() -> None:
+    finder, found = make()
+    finder.meet(Disc(4.0, 2.5, 3.0), NOW, 20.0, 9.0)
+    found.put(4.0, 0.0, 2.0)
+    path = finder.way(START, GOAL, NOW)
+    assert min(point[1] for point in path.points if abs(point[0] - 4.0) < 0.2) > 2.3
 
 
 def test_without_surroundings_the_map_is_all_there_is() -> None:
