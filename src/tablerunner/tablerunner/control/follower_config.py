@@ -42,10 +42,10 @@ class FollowerConfig(Config):
         2.0, description='Turn rate over heading error', unit='1/s', above=0.0, dynamic=True
     )
     turn_rate_in_place: float = parameter(
-        0.9, description='Largest turn rate on the spot', unit='rad/s', above=0.0, dynamic=True
+        1.2, description='Largest turn rate on the spot', unit='rad/s', above=0.0, dynamic=True
     )
     turn_rate_min: float = parameter(
-        0.15, description='Least turn rate on the spot', unit='rad/s', low=0.0, dynamic=True
+        0.3, description='Least turn rate on the spot', unit='rad/s', low=0.0, dynamic=True
     )
     lateral_acceleration: float = parameter(
         0.4, description='Largest sideways acceleration', unit='m/s^2', above=0.0, dynamic=True

@@ -73,7 +73,7 @@ class MissionConfig(Config):
         dynamic=True,
     )
     give_up_after: float = parameter(
-        180.0,
+        240.0,
         description='Time blocked on the way to one stop, in all, until it is missed',
         unit='s',
         above=0.0,
