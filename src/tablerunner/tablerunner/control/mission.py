@@ -24,6 +24,7 @@ from tablerunner.errors import MissionError
 from tablerunner.types import Velocity, seconds
 
 _LONGEST_STEP_S = 0.5
+_RESERVED_SHARE = 0.4
 _STATES = {
     LegPhase.PLANNING: MissionState.PLANNING,
     LegPhase.DRIVING: MissionState.DRIVING,
@@ -67,6 +68,7 @@ class Mission:
         self._readings: Readings | None = None
         self._state = MissionState.IDLE
         self._tour = Tour(())
+        self._spent_s = 0.0  # on the way to the stops before
         self._paused = False
         self._stay: HandOver | None = None
         self._events: list[str] = []
@@ -126,7 +128,7 @@ class Mission:
         if self.is_busy:
             raise MissionError('busy with another delivery: cancel it or wait until it is done')
         self.check(tour)
-        self._tour = tour
+        self._tour, self._spent_s = tour, 0.0
         self._message, self._paused = '', False
         self._lost.restart()
         self._begin_leg()
@@ -270,7 +272,7 @@ class Mission:
         if not localised or pose is None or stop is None:
             drive.rest()
             return velocity
-        step = drive.step(situation, pose, stop, dt, self.config.stop_limit)
+        step = drive.step(situation, pose, stop, dt, self._limit_s)
         self._events.extend(drive.events)
         drive.events.clear()
         self._state = self._driving_state
@@ -279,6 +281,14 @@ class Mission:
         elif step.missed:
             self._miss(step.missed)
         return step.velocity
+
+    @property
+    def _limit_s(self) -> float:
+        """Time that the way to this stop may take, so that some is left for those after it [s]."""
+        config, tour = self.config, self._tour
+        left_s = config.tour_limit * len(tour.legs) - self._spent_s
+        reserved_s = _RESERVED_SHARE * config.tour_limit * (len(tour.legs) - tour.index - 1)
+        return min(config.stop_limit, left_s - reserved_s)
 
     @property
     def _driving_state(self) -> MissionState:
@@ -329,6 +339,7 @@ class Mission:
         self._next()
 
     def _next(self) -> None:
+        self._spent_s += self._drive.taken_s
         self._begin_leg()
         if self._tour.goal is None:
             self._finish(MissionState.DONE if self._tour.is_success else MissionState.FAILED)

@@ -93,6 +93,13 @@ class MissionConfig(Config):
         above=0.0,
         dynamic=True,
     )
+    tour_limit: float = parameter(
+        300.0,
+        description='Time for all ways of a tour, for each of its stops and home',
+        unit='s',
+        above=0.0,
+        dynamic=True,
+    )
     off_path: float = parameter(
         0.5, description='Plan anew when farther from the path', unit='m', above=0.0, dynamic=True
     )

@@ -33,7 +33,7 @@ WAIT_S = 2.0
 LIMIT_S = 330.0
 """A tour that takes longer than this for each of its stops, home included, is endless.
 
-A mission may spend longer on one stop (`MissionConfig.stop_limit`), but not on all of them.
+A mission ends by itself before that: `MissionConfig.tour_limit`.
 """
 
 THERE_M = 0.4

@@ -281,6 +281,35 @@ def test_stop_not_reached_in_time_is_missed() -> None:
     assert status.missed == (('table_1', 'not reached within 3 s'),)
 
 
+def test_tour_ends_in_its_time_whatever_holds_the_robot_up() -> None:
+    """One stop may take what the others leave, but not what those after it are kept."""
+    world = World(config=MissionConfig(tour_limit=40.0))
+    world.held = True
+    world.mission.start((TABLE, SECOND, TABLE))
+    status = world.run()
+    assert [why for _, why in status.missed] == [
+        'not reached within 88 s',
+        'not reached within 16 s',
+        'not reached within 16 s',
+    ]
+    assert world.now_s - 1.0 == pytest.approx(3 * 40.0, abs=1.0)
+
+
+def test_time_that_one_stop_leaves_is_for_the_others_up_to_what_one_may_take() -> None:
+    world = World(config=MissionConfig(tour_limit=40.0, stop_limit=70.0))
+    world.mission.start((TABLE, SECOND))
+    world.until(MissionState.WAITING)
+    way_s = world.mission._drive.taken_s
+    assert 5.0 < way_s < 30.0
+    world.held = True
+    status = world.run()
+    assert status.missed[0][1] == f'not reached within {min(80.0 - way_s, 70.0):.0f} s'
+    again = World(config=MissionConfig(tour_limit=400.0, stop_limit=70.0))
+    again.held = True
+    again.mission.start((TABLE,))
+    assert again.run().missed[0][1] == 'not reached within 70 s'
+
+
 def test_unlocalised_robot_waits_and_goes_on_when_it_is_found() -> None:
     world = World()
     world.localised = False
