@@ -74,12 +74,12 @@ def test_full_speed_at_people_and_a_wall_touches_nothing(
     assert probe.call(Trigger, 'release', Trigger.Request()).success
 
     def before_the_wall() -> bool:
+        # It may stand for a moment farther away, where two echoes disagree, and then come nearer.
         stopped = states[-1].values[0].value == 'stop' and 'obstacle' in states[-1].message
-        return stopped and x() > WALL_M - 1.0 and abs(speed()) < 0.005
+        return stopped and x() > WALL_M - RADIUS_M - 0.4 and abs(speed()) < 0.005
 
     probe.wait_for(before_the_wall, 'a stop before the wall', LIMIT_S)
-    gap = WALL_M - RADIUS_M - x()
-    assert 0.0 < gap < 0.4
+    assert WALL_M - RADIUS_M - x() > 0.0
     words = [state.values[0].value for state in states]
     assert 'slow' in words[words.index('clear') : len(words) - words[::-1].index('slow')]
     command.linear.x, command.angular.z = 0.0, 0.5

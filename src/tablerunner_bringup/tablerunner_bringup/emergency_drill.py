@@ -11,7 +11,7 @@ from tablerunner.control import SafetyConfig, stopping_distance
 from tablerunner.types import seconds
 from tablerunner_bringup.monitor import Monitor, Movement
 
-DRIVING_M_S = 0.45
+DRIVING_M_S = 0.3  # where people walk it may drive no faster than caution.busy_speed
 HOLD_S = 3.0
 ASK_AGAIN_S = 1.0
 REQUEST_S = 0.5
