@@ -179,7 +179,16 @@ def test_linktrack_process_in_a_storm_gives_true_ranges_only(
     assert found(ranges) == TRUE
     assert {item.tag_id for item in ranges} == {'tag7'}
     assert ranges[-1].rx_power == -80.0
-    probe.wait_diagnostic(STATUS, 'device stamps', lambda text: text.startswith('device time'))
+
+    def dated() -> bool:
+        storm()  # it goes on: after silence the times of arrival count again
+        status = probe.diagnostic(STATUS)
+        return status is not None and any(
+            item.key == 'device stamps' and item.value.startswith('device time')
+            for item in status.values
+        )
+
+    probe.wait_for(dated, 'stamps by the time of the device')
     # Damage comes out under several reasons: the sum, the role, the length.
     status = probe.diagnostic(f'{STATUS}: uwb/device')
     assert status is not None
