@@ -295,6 +295,14 @@ def test_tour_ends_in_its_time_whatever_holds_the_robot_up() -> None:
     assert world.now_s - 1.0 == pytest.approx(3 * 40.0, abs=1.0)
 
 
+def test_each_tour_has_the_whole_of_its_time() -> None:
+    world = World(config=MissionConfig(tour_limit=40.0))
+    world.held = True
+    for _ in range(2):
+        world.mission.start((TABLE,))
+        assert world.run().missed == (('table_1', 'not reached within 40 s'),)
+
+
 def test_time_that_one_stop_leaves_is_for_the_others_up_to_what_one_may_take() -> None:
     world = World(config=MissionConfig(tour_limit=40.0, stop_limit=70.0))
     world.mission.start((TABLE, SECOND))
