@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +41,15 @@ class FloorMap:
         Distance of each cell centre to the nearest obstacle [m]; rows run along y.
     outside : ndarray of bool, shape (rows, columns)
         Cells that are connected with the border of the grid: outside a room with closed walls.
+    unseen : ndarray, shape (rows, columns), or None
+        Distance of each cell to where an obstacle may reach [m]; None: it is nowhere unknown.
     """
 
     origin: Vector
     resolution: float
     distance: Vector
     outside: NDArray[np.bool_] = field(repr=False)
+    unseen: Vector | None = field(default=None, repr=False)
 
     @classmethod
     def build(
@@ -108,7 +111,16 @@ class FloorMap:
         if not discs:
             return self
         distance = _with_discs(self.distance.ravel(), self.centres(), discs)
-        return FloorMap(self.origin, self.resolution, distance.reshape(self.shape), self.outside)
+        return replace(self, distance=distance.reshape(self.shape))
+
+    def at_ease(self, offset: float) -> FloorMap:
+        """Return the map as one likes to drive on it.
+
+        What may be an obstacle counts as one that is farther away by `offset` [m].
+        """
+        if self.unseen is None:
+            return self
+        return replace(self, distance=np.minimum(self.distance, self.unseen + offset))
 
     def centres(self) -> Vector:
         """Return the cell centres in map, shape (rows * columns, 2), row by row."""

@@ -74,7 +74,8 @@ class Planner:
 
     The grid search is Dijkstra's algorithm of scipy.sparse.csgraph on the 8-connected cells; its
     compiled loop is faster than an A* loop in Python would be with any heuristic. The staircase it
-    finds is then straightened where the straight line costs no more. docs/navigation.md.
+    finds is then straightened where the straight line costs no more. Where something may be, but
+    need not, a way is dear and not forbidden. docs/navigation.md.
 
     Parameters
     ----------
@@ -215,7 +216,7 @@ class Planner:
     ) -> NDArray[np.intp]:
         """Return the cheapest chain of cells, shape (n, 2) as (row, column)."""
         columns = floor.shape[1]
-        graph = _graph(allowed, self._cost(floor.distance), floor.resolution)
+        graph = _graph(allowed, self._cost(self._eased(floor).distance), floor.resolution)
         start, end = first[0] * columns + first[1], last[0] * columns + last[1]
         _, previous = csgraph.dijkstra(graph, indices=start, return_predecessors=True)
         if start != end and previous[end] < 0:
@@ -229,6 +230,10 @@ class Planner:
         index = np.array(chain[::-1])
         return np.column_stack(np.divmod(index, columns))
 
+    def _eased(self, floor: FloorMap) -> FloorMap:
+        """Return the floor by which places are priced: something may be where nobody looked."""
+        return floor.at_ease(self.config.clearance)
+
     def _cost(self, distance: Vector) -> Vector:
         """Return how much a metre counts at a distance from the nearest obstacle."""
         config = self.config
@@ -239,7 +244,8 @@ class Planner:
     def _straighten(self, floor: FloorMap, points: Vector, start: Pose2, goal: Pose2) -> Vector:
         """Drop corners wherever the straight line is allowed and costs no more."""
         step = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        cost = self._cost(floor.distance_at(points))
+        eased = self._eased(floor)
+        cost = self._cost(eased.distance_at(points))
         spent = np.concatenate([[0.0], np.cumsum(step * (cost[1:] + cost[:-1]) / 2)])
         kept = [0]
         while kept[-1] < len(points) - 1:
@@ -251,6 +257,8 @@ class Planner:
             samples = points[here] + share * (ends - points[here])[:, None, :]
             distance = floor.distance_at(samples)
             free = np.all(distance >= self._needed_at(samples, start, goal) - 1e-6, axis=1)
+            if eased is not floor:
+                distance = eased.distance_at(samples)
             price = length * self._cost(distance).mean(axis=1)
             good = free & (price <= (spent[here + 1 :] - spent[here]) * 1.01 + 1e-9)
             good[0] = True  # the next cell is always a neighbour

@@ -4,6 +4,9 @@ A grid of evidence (Moravec and Elfes, "High resolution maps from wide angle son
 cells of the floor map: an echo speaks for something on the arc on which it may lie, and against
 anything in the cone before it. Echoes that the map explains are left out. What is not confirmed
 is forgotten, for most of what is not on the map walks away; what stood for a while, slowly.
+
+Only the near face of a thing is heard. How far something that stands reaches behind that nobody
+knows until sound has passed there.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from tablerunner.control.path import Path
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.angles import difference
 from tablerunner.geometry.pose import Pose2
-from tablerunner.types import seconds
+from tablerunner.types import Vector, seconds
 
 _FADE_EVERY_S = 1.0
 _ARC_M = 0.06  # half the thickness of the arc of an echo
@@ -32,6 +35,7 @@ _SPACING_M = 0.1
 _FAR_M = 1.0  # what is farther from a path than this is of no interest
 _ELSEWHERE = 0.15
 _BLUR_M = 0.08  # places are found wider than they are
+_SILENT_SHARE = 0.2  # of silence: sound passes there, or has been mirrored away
 _COMPARED_S = 0.4  # readings farther apart than this are not compared
 _AHEAD_RAD = math.radians(60.0)
 _BESIDE_SHARE, _SUDDEN_SHARE = 1.5, 0.6
@@ -82,6 +86,18 @@ class SurroundingsConfig(Config):
         1.5, description='Whole echoes that make something of a place', above=0.0
     )
     most: float = parameter(4.0, description='No more echoes than these are remembered', above=0.0)
+    depth: float = parameter(
+        0.35,
+        description='So near to what stands there may be more of it, where no sound has passed',
+        unit='m',
+        low=0.0,
+    )
+    stands: float = parameter(
+        2.0, description='What was heard for so long stands', unit='s', low=0.0
+    )
+    passes: float = parameter(
+        2.0, description='Echoes from beyond a place that show that nothing was there', above=0.0
+    )
     fade_time: float = parameter(
         15.0, description='Time constant of forgetting', unit='s', above=0.0
     )
@@ -111,6 +127,8 @@ class SurroundingsConfig(Config):
         """Keep the bounds in their order."""
         if self.explained > self.explained_most:
             raise ConfigError('explained', self.explained, 'at most explained_most')
+        if self.stands > self.firm:
+            raise ConfigError('stands', self.stands, 'at most firm')
 
 
 class Surroundings:
@@ -140,6 +158,7 @@ class Surroundings:
     def reset(self) -> None:
         """Forget everything."""
         self._evidence = np.zeros(self._map.shape)
+        self._passed = np.zeros(self._map.shape)  # echoes from beyond, since something was there
         self._firm_s = np.zeros(self._map.shape)  # for how long something was heard there
         self._heard = np.zeros(self._map.shape, dtype=bool)  # since it was last faded
         self._ages = [math.inf] * len(self._mounts)
@@ -262,7 +281,10 @@ class Surroundings:
         away = np.hypot(dx, dy)
         against = config.silent if distance == math.inf else config.passed
         before = in_cone & (away < far - _BEFORE_M)
-        lost = against * (1.0 - aside[before] ** 2)  # less at the edges, which sound may miss
+        middle = 1.0 - aside[before] ** 2  # less at the edges, which sound may miss
+        passed = self._passed[rows, columns]
+        passed[before] += middle * (_SILENT_SHARE if distance == math.inf else 1.0)
+        lost = against * middle
         if distance == math.inf:  # sound is mirrored away from furniture
             firm = self._firm_s[rows, columns][before] >= config.firm
             lost *= np.where(firm, config.silent_firm, 1.0)
@@ -280,7 +302,9 @@ class Surroundings:
         weight = min(1.0, config.sharp / max(distance, 1e-6))
         share = (1.0 - aside[arc] ** 2) ** 2 - _ELSEWHERE
         evidence[arc] = np.clip(evidence[arc] + weight * share, 0.0, config.most)
-        self._heard[rows, columns] |= arc & (evidence >= config.enough)
+        is_there = arc & (evidence >= config.enough)
+        passed[is_there] = 0.0
+        self._heard[rows, columns] |= is_there
         return known_m
 
     @property
@@ -295,14 +319,25 @@ class Surroundings:
             found, floor = self.found, self._map
             self._floor = floor
             if found.any():
-                away = ndimage.distance_transform_edt(~found, sampling=floor.resolution)
+                away = _distance(found, floor)
                 self._floor = FloorMap(
                     floor.origin,
                     floor.resolution,
                     np.minimum(floor.distance, np.where(found, 0.0, away + _BLUR_M)),
                     floor.outside,
+                    self._unseen(found),
                 )
         return self._floor
+
+    def _unseen(self, found: NDArray[np.bool_]) -> Vector | None:
+        """Return how far each cell is from where what was found may reach [m]; None: nowhere."""
+        config = self.config
+        stands = found & (self._firm_s >= config.stands)
+        if not stands.any():
+            return None
+        unseen = _distance(stands, self._map) <= config.depth
+        unseen &= self._passed < config.passes
+        return _distance(unseen, self._map) if unseen.any() else None
 
     def gap(self, path: Path, begin: float, length: float) -> float:
         """Return how near what was found is to a part of a path [m]; inf: nothing was.
@@ -326,3 +361,8 @@ class Surroundings:
             return math.inf
         away2 = np.sum((points[:, None, :] - places[None]) ** 2, axis=-1)
         return math.sqrt(away2.min())
+
+
+def _distance(cells: NDArray[np.bool_], floor: FloorMap) -> Vector:
+    """Return how far each cell is from the nearest of some [m]."""
+    return np.asarray(ndimage.distance_transform_edt(~cells, sampling=floor.resolution))

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from tablerunner.control import Disc, FloorMap, Planner, PlannerConfig, make_planner
 from tablerunner.errors import ConfigError, PlanningError
@@ -18,6 +20,8 @@ WALLS = polygon_edges(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]])
 TABLE = rectangle_corners(4.0, 3.0, 0.4, 1.6, 1.0)
 FLOOR = FloorMap.build(WALLS, (TABLE,), (Disc(6.5, 1.5, 0.4),))
 PLANNER = Planner(FLOOR, RADIUS)
+EMPTY = FloorMap.build(WALLS)
+START, GOAL = Pose2(1.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0)
 
 
 def clearance(points: np.ndarray) -> np.ndarray:
@@ -174,3 +178,24 @@ def test_plan_leads_through_what_the_map_does_not_know() -> None:
         lengths.append(path.length)
     assert lengths[0] > 4.2
     assert lengths[1] == pytest.approx(4.0)
+
+
+def test_plan_keeps_off_where_something_may_be_unless_it_costs_too_much() -> None:
+    """Dear, but not forbidden: with discs beside it too."""
+    rows, columns = EMPTY.shape
+    xs, ys = EMPTY.centres().reshape(rows, columns, 2).transpose(2, 0, 1)
+
+    def plan(low: float, high: float, blocked: tuple[Disc, ...] = ()) -> np.ndarray:
+        there = (np.abs(xs - 4.0) <= 0.3) & (ys >= low) & (ys <= high)
+        away = ndimage.distance_transform_edt(~there, sampling=EMPTY.resolution)
+        floor = replace(EMPTY, unseen=away)
+        path = Planner(floor, RADIUS).plan(START, GOAL, blocked=blocked)
+        return path.resampled(0.02)
+
+    beside = plan(2.8, 3.2)
+    near = np.abs(beside[:, 0] - 4.0) < 0.3
+    assert np.abs(beside[near, 1] - 3.0).min() > 0.3
+    far = Disc(4.0, 5.2, 0.2)
+    assert np.abs(plan(2.8, 3.2, (far,))[:, 1] - 3.0).max() > 0.3
+    through = plan(0.0, 6.0)  # all across the room
+    assert np.abs(through[:, 1] - 3.0).max() < 0.1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tablerunner.control import Surroundings, SurroundingsConfig, make_planner, make_surroundings
-from tablerunner.control.fuzzy import UltrasonicRing
+from tablerunner.control.fuzzy import Readings, UltrasonicRing
 from tablerunner.control.path import Path
 from tablerunner.errors import ConfigError
 from tablerunner.geometry.pose import Pose2
@@ -137,6 +137,52 @@ def test_floor_and_path_show_what_was_found() -> None:
     assert listener.found.gap(far, 0.0, 4.0) == math.inf
     listener.found.reset()
     assert not len(listener.places())
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_floor_behind_what_was_found_is_unseen_until_sound_has_passed(seed: int) -> None:
+    listener = Listener(room(CHAIR), room(), seed)
+    assert listener.found.floor.unseen is None
+    listener.stand(Pose2(2.0, 2.0, 0.0), 1.5)  # before its face at x = 2.775
+    assert len(listener.places())
+    assert listener.found.floor.unseen is None  # somebody who walks has no such depth
+    listener.stand(Pose2(2.0, 2.0, 0.0), 2.5)
+    unseen = listener.found.floor.unseen
+    assert unseen is not None
+    cell = listener.found.floor.cell
+    for x, y in ((3.0, 2.0), (3.0, 2.1), (3.0, 1.9)):  # inside the chair
+        assert unseen[cell(x, y)] == 0.0
+    assert unseen[cell(2.45, 2.0)] > 0.05  # between robot and chair
+    assert unseen[cell(3.4, 2.0)] > 0.1  # deeper than anything is taken to be
+    assert unseen[cell(2.45, 2.9)] > 0.3  # nothing was heard anywhere near
+    listener.stand(Pose2(3.0, 1.2, math.pi / 2), 3.0)  # hears another face of it
+    listener.turn_to(room())  # the chair is taken away
+    listener.stand(Pose2(2.0, 2.05, 0.0), 3.0)  # sound passes there, but not at that face
+    assert np.hypot(*(listener.places() - [3.0, 2.0]).T).min() < 0.3
+    unseen = listener.found.floor.unseen
+    assert unseen is not None
+    assert unseen[cell(3.0, 2.0)] > 0.0
+
+
+def test_sound_that_passes_says_less_where_nothing_echoes_and_nothing_beyond_an_echo() -> None:
+    def seen_after(seconds: float, distance: float) -> float:
+        listener = Listener(room(), room(), 1)
+        floor, found, stamp = listener.found._map, listener.found, NANOSECONDS
+        for _ in range(round(seconds / 0.15)):
+            stamp += nanoseconds(0.15)
+            readings = Readings(distances_m=(math.nan,) * 2 + (distance,) + (math.nan,) * 2)
+            found.hear(readings, Pose2(1.0, 2.0, 0.0), stamp)
+        return float(found._passed[floor.cell(2.0, 2.0)])
+
+    echoes, silence = seen_after(3.0, 1.4), seen_after(3.0, math.inf)
+    assert echoes == pytest.approx(20.0, rel=0.02)
+    assert silence == pytest.approx(0.2 * echoes)
+    assert seen_after(3.0, 0.7) == 0.0
+
+
+def test_thing_that_stands_later_than_furniture_is_refused() -> None:
+    with pytest.raises(ConfigError, match='stands'):
+        SurroundingsConfig(stands=6.0, firm=5.0)
 
 
 def test_single_false_echo_is_not_believed() -> None:

@@ -33,10 +33,15 @@ NOW = 10 * NANOSECONDS
 class Found(Surroundings):
     """Surroundings with things put where a test wants them."""
 
-    def put(self, x: float, low: float, high: float) -> None:
-        """Put a wall of found cells at x from y = low to high."""
+    def put(self, x: float, low: float, high: float, seen_to: float = 8.0) -> None:
+        """Put a wall of found cells at x from y = low to high; sound has passed up to x = seen_to.
+
+        No more than a thin wall: but for what has not been seen there is nothing behind it.
+        """
         for y in np.arange(low, high, 0.05):
             self._evidence[self._map.cell(x, float(y))] = 9.0
+            self._firm_s[self._map.cell(x, float(y))] = 3.0
+        self._passed[:, : self._map.cell(seen_to, 0.0)[1]] = 9.0
         self._floor = None
 
 
@@ -60,6 +65,20 @@ def test_way_leads_round_what_was_found_and_through_it_only_if_need_be() -> None
     closed, _ = make(wall)
     with pytest.raises(PlanningError, match='no way'):
         closed.way(START, GOAL, NOW)
+
+
+def test_way_keeps_off_the_unseen_back_of_what_was_found() -> None:
+    """Where it turns in behind its face, it does so later."""
+    turned_in = Destination('goal', Pose2(5.0, 1.0, 0.0))
+
+    def corner_gap(seen_to: float) -> float:
+        finder, found = make()
+        found.put(4.0, 0.0, 2.0, seen_to)
+        points = finder.way(START, turned_in, NOW).resampled(0.02)
+        return float(np.hypot(*(points - [4.3, 1.95]).T).min())
+
+    assert corner_gap(8.0) < 0.31  # hardly more than the hull's radius
+    assert corner_gap(4.0) > 0.45
 
 
 def test_short_other_way_is_taken_at_once() -> None:
