@@ -35,6 +35,7 @@ _SPACING_M = 0.1
 _FAR_M = 1.0  # what is farther from a path than this is of no interest
 _ELSEWHERE = 0.15
 _BLUR_M = 0.08  # places are found wider than they are
+_MOST_PASSES = 2.0  # times as many as are needed are remembered
 _SILENT_SHARE = 0.2  # of silence: sound passes there, or has been mirrored away
 _COMPARED_S = 0.4  # readings farther apart than this are not compared
 _AHEAD_RAD = math.radians(60.0)
@@ -158,7 +159,7 @@ class Surroundings:
     def reset(self) -> None:
         """Forget everything."""
         self._evidence = np.zeros(self._map.shape)
-        self._passed = np.zeros(self._map.shape)  # echoes from beyond, since something was there
+        self._passed = np.zeros(self._map.shape)  # echoes from beyond
         self._firm_s = np.zeros(self._map.shape)  # for how long something was heard there
         self._heard = np.zeros(self._map.shape, dtype=bool)  # since it was last faded
         self._ages = [math.inf] * len(self._mounts)
@@ -247,6 +248,7 @@ class Surroundings:
         slowly = self._firm_s >= config.firm
         times = np.where(slowly, config.firm_fade_time, config.fade_time)
         self._evidence *= np.exp(-self._fade_s / times)
+        self._passed *= math.exp(-self._fade_s / config.firm_fade_time)  # a thing may be put there
         heard_s = np.where(self._heard, self._fade_s, 0.0)
         self._firm_s = np.where(self.found, self._firm_s + heard_s, 0.0)
         self._heard[:] = False
@@ -283,7 +285,8 @@ class Surroundings:
         before = in_cone & (away < far - _BEFORE_M)
         middle = 1.0 - aside[before] ** 2  # less at the edges, which sound may miss
         passed = self._passed[rows, columns]
-        passed[before] += middle * (_SILENT_SHARE if distance == math.inf else 1.0)
+        share = _SILENT_SHARE if distance == math.inf else 1.0
+        passed[before] = np.minimum(passed[before] + share * middle, _MOST_PASSES * config.passes)
         lost = against * middle
         if distance == math.inf:  # sound is mirrored away from furniture
             firm = self._firm_s[rows, columns][before] >= config.firm
@@ -302,9 +305,7 @@ class Surroundings:
         weight = min(1.0, config.sharp / max(distance, 1e-6))
         share = (1.0 - aside[arc] ** 2) ** 2 - _ELSEWHERE
         evidence[arc] = np.clip(evidence[arc] + weight * share, 0.0, config.most)
-        is_there = arc & (evidence >= config.enough)
-        passed[is_there] = 0.0
-        self._heard[rows, columns] |= is_there
+        self._heard[rows, columns] |= arc & (evidence >= config.enough)
         return known_m
 
     @property

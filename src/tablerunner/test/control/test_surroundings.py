@@ -174,10 +174,26 @@ def test_sound_that_passes_says_less_where_nothing_echoes_and_nothing_beyond_an_
             found.hear(readings, Pose2(1.0, 2.0, 0.0), stamp)
         return float(found._passed[floor.cell(2.0, 2.0)])
 
-    echoes, silence = seen_after(3.0, 1.4), seen_after(3.0, math.inf)
-    assert echoes == pytest.approx(20.0, rel=0.02)
+    echoes, silence = seen_after(0.45, 1.4), seen_after(0.45, math.inf)
+    assert echoes == pytest.approx(3.0, rel=0.02)
     assert silence == pytest.approx(0.2 * echoes)
     assert seen_after(3.0, 0.7) == 0.0
+
+
+def test_floor_that_sound_passed_long_ago_is_unseen_again() -> None:
+    """Something may have been put there since."""
+    inside = []
+    for away_s in (1.0, 40.0):
+        listener = Listener(room(), room(), 1)
+        listener.stand(Pose2(2.0, 2.0, 0.0), 4.0)
+        listener.stand(Pose2(1.0, 2.0, math.pi), away_s)
+        listener.turn_to(room(CHAIR))
+        listener.stand(Pose2(2.0, 2.0, 0.0), 4.0)
+        unseen = listener.found.floor.unseen
+        assert unseen is not None
+        inside.append(unseen[listener.found.floor.cell(3.0, 2.0)])
+    assert inside[0] > 0.0
+    assert inside[1] == 0.0
 
 
 def test_thing_that_stands_later_than_furniture_is_refused() -> None:
