@@ -77,6 +77,9 @@ def test_way_keeps_off_the_unseen_back_of_what_was_found() -> None:
         points = finder.way(START, turned_in, NOW).resampled(0.02)
         return float(np.hypot(*(points - [4.3, 1.95]).T).min())
 
+    _, all_seen = make()
+    all_seen.put(4.0, 0.0, 2.0)
+    assert all_seen.floor.unseen is None
     assert corner_gap(8.0) < 0.31  # hardly more than the hull's radius
     assert corner_gap(4.0) > 0.45
 
