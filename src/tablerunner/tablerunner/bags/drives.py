@@ -65,7 +65,11 @@ class RecordedDrive:
 
 
 def read_drive(
-    bag: BagReader, odometer: OdometerConfig, namespace: str = '', raw: bool = True
+    bag: BagReader,
+    odometer: OdometerConfig,
+    namespace: str = '',
+    raw: bool = True,
+    names: Names | None = None,
 ) -> RecordedDrive:
     """Read a drive.
 
@@ -80,6 +84,9 @@ def read_drive(
         Namespace of the robot in the bag.
     raw : bool
         Whether uwb/ranges are taken as they were before calibration.
+    names : Names, optional
+        Joints of the wheels and mounting of the IMU. Frames do not matter: nothing here is
+        compared with what others know of the same frame.
 
     Raises
     ------
@@ -101,12 +108,15 @@ def read_drive(
         raise BagError(f'{bag.path} holds neither uwb/exchanges nor uwb/ranges')
     topics = [moved, ranged, 'uwb/anchors', *(['imu/data'] if moved == 'joint_states' else [])]
     gathered = _Gathered(odometer)
-    for item in bag_records(
-        bag, [t for t in topics if present(t)], namespace, converters(Names())
-    ):
+    use = replace(names or Names(), map_frame='', odom_frame='', base_frame='')
+    present_topics = [topic for topic in topics if present(topic)]
+    for item in bag_records(bag, present_topics, namespace, converters(use)):
         gathered.take(item.record)
     if len(gathered.odometry) < 2:
-        raise BagError(f'{bag.path}: no sample of {moved} could be used')
+        why = f': {gathered.refused}' if gathered.refused else ''
+        if moved == 'joint_states':
+            why += f' (expected are {", ".join((*use.left_joints, *use.right_joints))})'
+        raise BagError(f'{bag.path}: no sample of {moved} could be used{why}')
     track = Track.of(gathered.odometry)
     samples = gathered.all_ranges()
     table, links, blocked = _sorted_out(samples, raw)
@@ -129,9 +139,10 @@ class _Gathered:
         self._ranges: list[RangeSample] = []
         self.odometry: list[OdometrySample] = []
         self.anchors: tuple[Anchor, ...] = ()
+        self.refused = ''  # why the first message that was refused was so
 
     def take(self, record: object) -> None:
-        """Take one record; refusals are left out."""
+        """Take one record; refusals are left out, and the first one is remembered."""
         if isinstance(record, WheelSample):
             self._take_wheels(record)
         elif isinstance(record, ImuSample):
@@ -143,6 +154,8 @@ class _Gathered:
             self._exchanges.append(record)
         elif isinstance(record, RangeSample):
             self._ranges.append(record)
+        elif isinstance(record, Refusal):
+            self.refused = self.refused or record.reason
         elif isinstance(record, tuple) and not self.anchors:
             self.anchors = record
 

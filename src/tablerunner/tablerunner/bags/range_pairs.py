@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablerunner.bags.reader import BagReader
-from tablerunner.bags.streams import Names, bag_records, converters, full_name
+from tablerunner.bags.streams import bag_records, full_name
 from tablerunner.errors import BagError
 from tablerunner.evaluation.truth import Truth
 from tablerunner.messages.truth import TruePose
@@ -132,7 +132,7 @@ def _records(
     ranger = Ranger(plain)
     ranges: list[RangeSample] = []
     poses: list[TruePose] = []
-    for item in bag_records(bag, topics, namespace, converters(Names())):
+    for item in bag_records(bag, topics, namespace):
         record = item.record
         if isinstance(record, ExchangeSample):
             if record.anchor_id not in plain.anchor_ids:

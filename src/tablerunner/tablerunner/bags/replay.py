@@ -12,7 +12,7 @@ import numpy as np
 from tablerunner.bags.reader import BagReader
 from tablerunner.bags.replay_config import ReplayConfig
 from tablerunner.bags.storage import Damage
-from tablerunner.bags.streams import Names, bag_records, converters, full_name
+from tablerunner.bags.streams import bag_records, converters, full_name
 from tablerunner.errors import BagError
 from tablerunner.estimation import Localizer, LocalizerState, Outcome
 from tablerunner.estimation.recording import RecordingLocalizer, Run
@@ -168,22 +168,10 @@ def replay(bag: BagReader, config: ReplayConfig) -> ReplayResult:
         bag,
         run.topics,
         config.namespace,
-        converters(_names(config)),
+        converters(config.names),
     ):
         run.take(topic, received, record)
     return run.result()
-
-
-def _names(config: ReplayConfig) -> Names:
-    return Names(
-        config.left_joints,
-        config.right_joints,
-        config.imu_heading,
-        config.map_frame,
-        config.odom_frame,
-        config.base_frame,
-        config.imu_tilt,
-    )
 
 
 @dataclass
@@ -253,7 +241,7 @@ class _Replay:
 
     def _take_bag_anchors(self) -> None:
         """Use the anchors that the driver announced when the bag was recorded."""
-        table = converters(_names(self._config))
+        table = converters(self._config.names)
         for item in bag_records(self._bag, ['uwb/anchors'], self._config.namespace, table):
             if isinstance(item.record, tuple) and item.record:
                 self._config = self._config.with_anchors(item.record)

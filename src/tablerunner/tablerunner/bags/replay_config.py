@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from tablerunner.bags.streams import Names
 from tablerunner.config import Config, parameter
 from tablerunner.estimation import LocalizerConfig
 from tablerunner.messages.wheels import LEFT_JOINT, RIGHT_JOINT
@@ -52,6 +53,19 @@ class ReplayConfig(Config):
     keep: bool = parameter(
         False, description='Whether every step of the estimator is kept, as smoothing needs it'
     )
+
+    @property
+    def names(self) -> Names:
+        """What the messages are expected to be named."""
+        return Names(
+            self.left_joints,
+            self.right_joints,
+            self.imu_heading,
+            self.map_frame,
+            self.odom_frame,
+            self.base_frame,
+            self.imu_tilt,
+        )
 
     @classmethod
     def from_scenario(cls, scenario: Scenario) -> ReplayConfig:

@@ -37,6 +37,12 @@ def wheels(
             metavar='F', help='Robot and anchors; scenario.yaml in or beside BAG if not given.'
         ),
     ] = None,
+    params: Annotated[
+        Optional[list[Path]],
+        typer.Option(
+            metavar='FILE', help="ROS parameter file of the robot's nodes; may be given often."
+        ),
+    ] = None,
     json_file: Annotated[
         Optional[Path], typer.Option('--json', metavar='FILE', help='Write the figures to a file.')
     ] = None,
@@ -70,10 +76,10 @@ def wheels(
         if file.exists():
             raise ConfigError('--output', str(file), 'a file that does not exist yet', 'options')
     room = find_scenario(bag, scenario)
-    settings = replay_config(room, 'ekf', '', namespace)
+    settings = replay_config(room, 'ekf', '', namespace, tuple(params or ()))
     with Progress() as progress, BagReader(bag) as reader:
         progress.show(f'reading {bag}')
-        drive = read_drive(reader, settings.odometer, namespace, raw=bias_std > 0.0)
+        drive = read_drive(reader, settings.odometer, namespace, bias_std > 0.0, settings.names)
         for item in reader.damage:
             progress.say(f'damaged: {item}', 'yellow')
         for note in drive.notes:

@@ -134,6 +134,32 @@ def rewritten(
     return target
 
 
+def test_joints_of_other_names_are_told_by_the_parameter_file_of_the_robot(
+    drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def renamed(message: object) -> list[object]:
+        if hasattr(message, 'name'):
+            message.name = [name.replace('wheel_joint', 'motor') for name in message.name]
+        return [message]
+
+    topics = {'joint_states', 'imu/data', 'uwb/exchanges', 'uwb/anchors'}
+    bag = rewritten(drive, tmp_path / 'bag', topics, renamed)
+    robot, told = tmp_path / 'robot.yaml', []
+    joints = {'left_joints': ['left_motor'], 'right_joints': ['right_motor']}
+    robot.write_text(yaml.safe_dump({'odom_node': {'ros__parameters': joints}}))
+    plain = ['calibrate', 'wheels', str(drive), '-o', str(tmp_path / 'plain.yaml')]
+    command = ['calibrate', 'wheels', str(bag), '-o', str(tmp_path / 'odom.yaml')]
+    for number, call in enumerate((plain, [*command, '--params', str(robot)])):
+        figures = tmp_path / f'{number}.json'
+        assert main([*call, '--json', str(figures)]) == 0
+        told.append(json.loads(figures.read_text())['left_radius_m'])
+    assert told[1] == pytest.approx(told[0], rel=1e-6)
+    capsys.readouterr()
+    for command in (['calibrate', 'wheels'], ['survey-anchors']):
+        assert main([*command, str(bag), '-o', str(tmp_path / 'other.yaml')]) == 2
+        assert 'left_wheel_joint' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ('topics', 'words'),
     [
