@@ -341,7 +341,7 @@ def _as_meant(
 ) -> bool:
     """Return whether exactly the stops can be reached that are meant to be, beyond doubt."""
     wide = grid.free(radius + KNOWN_SPACE_M, radius + UNKNOWN_SPACE_M)
-    if not all(grid.joined(home, tuple(open_stops), wide)):
+    if not all(grid.joined(home, (home, *open_stops), wide)):
         return False
     narrow = grid.free(radius + CLOSED_SPACE_M, radius + CLOSED_SPACE_M)
     return not any(grid.joined(home, tuple(shut_stops), narrow))

@@ -63,6 +63,15 @@ def test_planner_agrees_on_what_can_be_reached(seed: int) -> None:
     assert not any(ways(room, 0.0)[name] for name in room.closed)
 
 
+@pytest.mark.parametrize('seed', [*range(12), 16127])
+def test_home_is_free(seed: int) -> None:
+    """Also where nothing else of the tour is: in 16127 somebody stood in it once."""
+    room = made(seed)
+    needed = room.scenario.robot.footprint_radius + 0.12
+    home = room.scenario.start_pose
+    assert planner_of(room, 0.12).floor.distance_at(np.array([home.x, home.y])) >= needed
+
+
 @settings(max_examples=12, deadline=None)
 @given(SEEDS)
 def test_map_lacks_what_is_unknown_and_nothing_else(seed: int) -> None:
