@@ -24,7 +24,7 @@ from tablerunner.errors import MissionError
 from tablerunner.types import Velocity, seconds
 
 _LONGEST_STEP_S = 0.5
-_RESERVED_SHARE = 0.4  # of the time of a stop, for each stop that follows
+_RESERVED_SHARE = 0.5  # of the time of a stop, for each stop that follows
 _STATES = {
     LegPhase.PLANNING: MissionState.PLANNING,
     LegPhase.DRIVING: MissionState.DRIVING,

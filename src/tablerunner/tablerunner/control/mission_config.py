@@ -94,7 +94,7 @@ class MissionConfig(Config):
         dynamic=True,
     )
     tour_limit: float = parameter(
-        300.0,
+        320.0,
         description='Time for all ways of a tour, for each of its stops and home',
         unit='s',
         above=0.0,

@@ -288,9 +288,9 @@ def test_tour_ends_in_its_time_whatever_holds_the_robot_up() -> None:
     world.mission.start((TABLE, SECOND, TABLE))
     status = world.run()
     assert [why for _, why in status.missed] == [
-        'not reached within 88 s',
-        'not reached within 16 s',
-        'not reached within 16 s',
+        'not reached within 80 s',
+        'not reached within 20 s',
+        'not reached within 20 s',
     ]
     assert world.now_s - 1.0 == pytest.approx(3 * 40.0, abs=1.0)
 
