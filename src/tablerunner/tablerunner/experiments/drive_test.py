@@ -149,6 +149,7 @@ def _is_whole(leg: Leg) -> bool:
 def _asked(name: str, drives: Sequence[RoomDrive]) -> list[Row]:
     """Return the rows that have bounds."""
     legs = [leg for drive in drives for leg in drive.legs]
+    tables = [leg for drive in drives for leg in drive.legs[:-1]]  # the last way is the one home
     rows = [
         Row(
             f'{name}, collisions by the robot',
@@ -163,11 +164,12 @@ def _asked(name: str, drives: Sequence[RoomDrive]) -> list[Row]:
             bound=NONE,
         ),
     ]
-    for words, is_open, bound in (
-        ('stops reached that can be', True, ARRIVE),
-        ('stops reported that cannot be', False, ALL),
+    for words, of, is_open, bound in (
+        ('deliveries that arrive where they can', tables, True, ARRIVE),
+        ('stops reached that can be', legs, True, ARRIVE),
+        ('stops reported that cannot be', legs, False, ALL),
     ):
-        shares = [100.0 * leg.is_right for leg in legs if leg.is_open is is_open]
+        shares = [100.0 * leg.is_right for leg in of if leg.is_open is is_open]
         if shares:
             rows.append(Row(f'{name}, {words}', '%', Spread.of(shares), bound=bound))
     return rows

@@ -108,6 +108,19 @@ def test_one_missed_stop_in_a_hundred_is_allowed() -> None:
     assert not DriveTest((good, made_up(missed, missed))).holds
 
 
+def test_way_home_is_a_stop_and_no_delivery() -> None:
+    home = leg(stop='kitchen', reached=False, reason='blocked')
+    test = DriveTest((made_up(leg(), home),))
+    rows = {row.name: row for row in test.rows()}
+    assert rows['fuzzy, deliveries that arrive where they can'].measured.mean == 100.0
+    assert rows['fuzzy, deliveries that arrive where they can'].holds
+    assert rows['fuzzy, stops reached that can be'].measured.mean == 50.0
+    lost = replace(home, stop='table_1')
+    missed = DriveTest((made_up(lost, leg(stop='kitchen')),))
+    rows = {row.name: row for row in missed.rows()}
+    assert not rows['fuzzy, deliveries that arrive where they can'].holds
+
+
 def test_controllers_are_compared_on_the_same_whole_legs() -> None:
     other = leg(stop='table_2')
     ours = made_up(leg(time_s=30.0, way_m=6.0), other)
