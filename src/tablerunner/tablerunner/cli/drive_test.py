@@ -46,7 +46,7 @@ def drive_test(
 
     Rooms have walls with doors, tables, up to ten people and things that are not on the map; some
     tables cannot be reached. Asked is that the robot runs into nothing, reaches at least 99 % of
-    the stops that can be reached, tells why it missed the others, and never drives endlessly.
+    the tables that can be reached, tells why it missed the others, and never drives endlessly.
     Rooms in which something goes wrong are saved. Exit code 1: a bound was missed.
 
     Example: tablerunner drive-test --rooms 40 --controller all

@@ -166,7 +166,7 @@ def _asked(name: str, drives: Sequence[RoomDrive]) -> list[Row]:
     ]
     for words, of, is_open, bound in (
         ('deliveries that arrive where they can', tables, True, ARRIVE),
-        ('stops reached that can be', legs, True, ARRIVE),
+        ('stops reached that can be', legs, True, None),
         ('stops reported that cannot be', legs, False, ALL),
     ):
         shares = [100.0 * leg.is_right for leg in of if leg.is_open is is_open]
