@@ -110,10 +110,13 @@ def read_drive(
     gathered = _Gathered(odometer)
     use = replace(names or Names(), map_frame='', odom_frame='', base_frame='')
     present_topics = [topic for topic in topics if present(topic)]
+    refused = ''  # why the first sample of motion was
     for item in bag_records(bag, present_topics, namespace, converters(use)):
+        if item.topic == moved and isinstance(item.record, Refusal):
+            refused = refused or item.record.reason
         gathered.take(item.record)
     if len(gathered.odometry) < 2:
-        why = f': {gathered.refused}' if gathered.refused else ''
+        why = f': {refused}' if refused else ''
         if moved == 'joint_states':
             why += f' (expected are {", ".join((*use.left_joints, *use.right_joints))})'
         raise BagError(f'{bag.path}: no sample of {moved} could be used{why}')
@@ -139,10 +142,9 @@ class _Gathered:
         self._ranges: list[RangeSample] = []
         self.odometry: list[OdometrySample] = []
         self.anchors: tuple[Anchor, ...] = ()
-        self.refused = ''  # why the first message that was refused was so
 
     def take(self, record: object) -> None:
-        """Take one record; refusals are left out, and the first one is remembered."""
+        """Take one record; refusals are left out."""
         if isinstance(record, WheelSample):
             self._take_wheels(record)
         elif isinstance(record, ImuSample):
@@ -154,8 +156,6 @@ class _Gathered:
             self._exchanges.append(record)
         elif isinstance(record, RangeSample):
             self._ranges.append(record)
-        elif isinstance(record, Refusal):
-            self.refused = self.refused or record.reason
         elif isinstance(record, tuple) and not self.anchors:
             self.anchors = record
 
